@@ -1,0 +1,3 @@
+//! Build tasks: `cargo xtask demo`, `cargo xtask test`.
+
+fn main() {}

@@ -1,0 +1,100 @@
+//! `sim/...`: simulation only. No service but the scorer may read `sim/truth`.
+
+use crate::field::{fields, message};
+
+/// Most people that walk in a world.
+pub const MAX_PEOPLE: usize = 16;
+
+message! {
+    /// The trigger of a ping group, from `sonar`'s simulator driver.
+    pub struct Ping on "sim/ping" {
+        /// Bit = index in the vehicle's list of sonars.
+        pub sensors: u32,
+        /// Counts from 1; the echo carries it back.
+        pub ping: u32,
+    }
+}
+
+fields! {
+    /// What one simulated sensor heard.
+    pub struct EchoReading {
+        /// Width of the echo pulse, seconds (time of flight both ways); NaN when nothing came back.
+        pub pulse_s: f32,
+        /// Index in the vehicle's list of sonars.
+        pub sensor: u8,
+        /// 1 when the sensor answered at all (a dead one does not).
+        pub answered: u8,
+        /// Always zero.
+        pub reserved: u16,
+    }
+}
+
+message! {
+    /// The echo pulses of one ping group, sent when the last one has ended.
+    pub struct Echo on "sim/echo" {
+        /// When the ping left, on the simulator's clock.
+        pub ping_ns: u64,
+        /// The ping that this answers.
+        pub ping: u32,
+        /// Filled readings; more than [`crate::MAX_SONARS`] is a broken message.
+        pub count: u32,
+        /// One entry a sensor.
+        pub readings: [EchoReading; 16],
+    }
+}
+
+fields! {
+    /// A person in the world.
+    pub struct PersonTruth {
+        /// World frame.
+        pub x_m: f32,
+        /// World frame.
+        pub y_m: f32,
+    }
+}
+
+message! {
+    /// The truth: measured by, never flown by.
+    pub struct Truth on "sim/truth" {
+        /// Simulated time since the simulator started.
+        pub time_s: f64,
+        /// Plan frame (the building as built).
+        pub x_m: f32,
+        /// Plan frame.
+        pub y_m: f32,
+        /// Above the floor: the lowest point of the airframe.
+        pub z_m: f32,
+        /// Right side down positive.
+        pub roll_rad: f32,
+        /// Nose down positive.
+        pub pitch_rad: f32,
+        /// Plan frame.
+        pub yaw_rad: f32,
+        /// Plan frame.
+        pub velocity_x_m_s: f32,
+        /// Plan frame.
+        pub velocity_y_m_s: f32,
+        /// Plan frame.
+        pub velocity_z_m_s: f32,
+        /// Distance from the airframe's cylinder to the nearest solid now; negative when inside.
+        pub clearance_m: f32,
+        /// Smallest clearance so far in flight.
+        pub min_clearance_m: f32,
+        /// Battery voltage at the terminals.
+        pub volts: f32,
+        /// Share of the charge left.
+        pub charge: f32,
+        /// Contacts so far (a touch, a hard or a tilted landing; one a touch until clear again).
+        pub contacts: u32,
+        /// 1 when the controller is armed.
+        pub armed: u32,
+        /// 1 when the skids touch the floor or the pad.
+        pub on_ground: u32,
+        /// Filled people.
+        pub people_used: u32,
+        /// Always zero.
+        pub reserved: u32,
+        /// Where people are.
+        pub people: [PersonTruth; 16],
+    }
+}

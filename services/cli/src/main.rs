@@ -1,0 +1,3 @@
+//! `sereno`, the command an operator or developer types.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! The flight process.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! The flow process.
+
+fn main() {}

@@ -1,0 +1,2 @@
+//! Local obstacle avoidance: the Vector Field Histogram.
+#![forbid(unsafe_code)]

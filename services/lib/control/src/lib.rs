@@ -1,0 +1,2 @@
+//! Flight control laws, the shield, arbitration and the failsafe table.
+#![forbid(unsafe_code)]

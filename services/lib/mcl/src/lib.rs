@@ -1,0 +1,2 @@
+//! Monte Carlo localization on ultrasonic cones.
+#![forbid(unsafe_code)]

@@ -1,0 +1,3 @@
+//! The localization process.
+
+fn main() {}

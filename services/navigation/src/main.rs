@@ -1,0 +1,3 @@
+//! The navigation process.
+
+fn main() {}

@@ -1,0 +1,3 @@
+//! The pilot process.
+
+fn main() {}

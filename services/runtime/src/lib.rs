@@ -1,0 +1,1 @@
+//! How a process lives: typed ports, clock, heartbeat, configuration, logging, shutdown.

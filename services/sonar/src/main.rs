@@ -1,0 +1,3 @@
+//! The sonar process.
+
+fn main() {}

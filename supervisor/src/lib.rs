@@ -1,0 +1,1 @@
+//! Creates and holds all shared memory, keeps retained state, spawns, watches, reaps, restarts.

@@ -1,0 +1,3 @@
+//! The supervisor process.
+
+fn main() {}
