@@ -1,1 +1,55 @@
 //! Creates and holds all shared memory, keeps retained state, spawns, watches, reaps, restarts.
+//!
+//! One process, one thread, one loop over `poll`: child ends, heartbeats, requests, log pipes and timers. It
+//! depends on no service and on no async runtime. Every service is a child process:
+//!
+//! - it is started in the order of its criticality and speaks plain `sd_notify` (`READY=1`, `WATCHDOG=1`,
+//!   `STATUS=...`, `STOPPING=1`) to the supervisor's socket;
+//! - when it ends, what it retained is saved, what it left in shared memory is cleaned up, and it is started
+//!   again by its policy: at once the first time, then with a delay that doubles to a cap ([`life::Life`]);
+//! - when it is silent for longer than its heartbeat it is killed, which is an end like any other;
+//! - what it prints is kept, bounded, and shown by `sereno logs`.
+//!
+//! The first SIGTERM or Ctrl-C lands what flies, then stops the services in reverse order and removes
+//! everything from shared memory and the run directory; the second one stops at once.
+
+mod child;
+pub mod client;
+mod control;
+mod error;
+pub mod life;
+mod log;
+mod notify;
+mod options;
+mod place;
+pub mod protocol;
+mod shared;
+mod supervisor;
+
+pub use client::{Client, ClientError};
+pub use error::SupervisorError;
+pub use options::{Options, default_run_dir, parse_arguments};
+pub use shared::{NoSharedMemory, SharedMemory};
+
+use runtime::shm::RunDir;
+
+/// Starts the system and watches it until it is told to stop; returns when nothing of it is left.
+///
+/// # Errors
+/// A manifest that does not hold together, a run directory that another supervisor holds or that is not
+/// private, shared memory or sockets that cannot be made. A service that fails is not an error: it is
+/// restarted, and shown.
+pub fn run(options: &Options) -> Result<(), SupervisorError> {
+    run_with(options, shared::Held::create)
+}
+
+/// [`run`] with other shared memory, made by `create` under the lock, with no child alive.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with<S: SharedMemory>(
+    options: &Options,
+    create: impl FnOnce(&manifest::Manifest, &RunDir) -> Result<S, SupervisorError>,
+) -> Result<(), SupervisorError> {
+    supervisor::Supervisor::start(options, create)?.run()
+}

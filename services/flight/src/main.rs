@@ -1,3 +1,5 @@
 //! The flight process.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    runtime::main::<flight::Flight>(flight::SerialPorts)
+}

@@ -1,0 +1,441 @@
+//! The conversation with the flight controller: bytes in, bytes out, time as an argument.
+
+use crate::arming::Evidence;
+use crate::order::{ReceiverOrder, throttle_of};
+use crate::schedule::{Question, Schedule};
+use msp::messages::{
+    Analog, AnalogReply, ApiVersion, Arming, Attitude, AttitudeReply, BoxIds, FcVariant, FcVersion, Motor, Rc,
+    RxMap, SetRawRc, Status, StatusReply,
+};
+use msp::{Decoder, Direction, EncodeError, Frame, Request, Version, encode_request, parse_reply};
+
+/// Without any answer for so long the controller is silent.
+const SILENT_NS: u64 = 1_000_000_000;
+/// A question that was not answered by then is lost; the slowest answer seen took a tenth of it.
+const LOST_NS: u64 = 250_000_000;
+/// Questions on the way at once; with the frames far below the controller's 192-byte buffer.
+const MOST_OUTSTANDING: usize = 3;
+/// Least time between two commands: nearly one pass of the controller's task.
+const SPACING_NS: u64 = 8_000_000;
+/// Half a frame and then nothing for so long: the rest will not come.
+const QUIET_NS: u64 = 50_000_000;
+/// The receiver's order is waited for this long before it is taken for AETR: two passes of the task and more.
+const ORDER_WAIT_NS: u64 = 40_000_000;
+/// A status older than this says nothing about arming.
+const STATUS_OLD_NS: u64 = 500_000_000;
+/// The longest frame sent: version 2 with 18 channels is 45 bytes.
+pub const MAX_FRAME: usize = 64;
+
+/// Permanent ids of modes and the bits that `flight/state` gives them.
+const MODES: [(u8, u32); 4] = [(0, 1), (1, 2), (27, 4), (50, 8)];
+
+/// Who the controller is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// `BTFL`, `INAV`; zero before it is known.
+    pub variant: [u8; 4],
+    /// Major, minor, patch, 0.
+    pub version: [u8; 4],
+    /// Minor version of the MSP messages.
+    pub api: Option<(u8, u8)>,
+}
+
+/// An attitude and when it was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AttitudeSample {
+    /// Half the round trip before the answer.
+    pub sampled_ns: u64,
+    /// In the controller's frame.
+    pub reply: AttitudeReply,
+}
+
+/// The newest of everything that the controller said. Taken fields are set anew by each answer.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Said {
+    /// Taken by the publisher.
+    pub attitude: Option<AttitudeSample>,
+    /// Taken by the publisher.
+    pub analog: Option<AnalogReply>,
+    /// The newest status and when it came.
+    pub status: Option<(u64, StatusReply)>,
+    /// Statuses so far.
+    pub statuses: u32,
+    /// Motor outputs.
+    pub motors_us: [u16; 8],
+    /// Throttle as the controller has it.
+    pub throttle_us: Option<u16>,
+    /// The controller refused a frame of channels: its receiver is not MSP.
+    pub channels_refused: bool,
+    /// The receiver's order makes no sense.
+    pub order_broken: bool,
+}
+
+/// Counts since the port opened.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Frames of channels sent.
+    pub frames: u32,
+    /// Answers that belong to a question or a frame.
+    pub answers: u32,
+    /// Broken, too short or unasked for.
+    pub refused: u32,
+    /// Bytes that belong to no frame.
+    pub junk: u32,
+}
+
+/// The link, while the port is open.
+#[derive(Debug, Clone)]
+pub struct Link {
+    version: Version,
+    decoder: Decoder<1024>,
+    schedule: Schedule,
+    /// When each question that is on its way was sent.
+    asked_ns: [Option<u64>; 10],
+    /// Which questions of [`Question::once`] are answered (or refused, which is an answer).
+    settled: [bool; 10],
+    opened_ns: u64,
+    byte_ns: u64,
+    answer_ns: Option<u64>,
+    command_ns: Option<u64>,
+    frame_ns: Option<u64>,
+    unacknowledged: u32,
+    asked_since_frame: bool,
+    counts: Counts,
+    /// Index of each of [`MODES`] in the controller's list; ARM is the first before the list is known.
+    box_index: [Option<u8>; 4],
+    order: Option<ReceiverOrder>,
+    identity: Identity,
+    /// What the controller said.
+    pub said: Said,
+}
+
+impl Link {
+    /// A link over a port that opened `now`.
+    #[must_use]
+    pub fn new(now: u64, msp_version: u8) -> Self {
+        Self {
+            version: if msp_version == 1 { Version::V1 } else { Version::V2 },
+            decoder: Decoder::new(),
+            schedule: Schedule::new(now),
+            asked_ns: [None; 10],
+            settled: [false; 10],
+            opened_ns: now,
+            byte_ns: now,
+            answer_ns: None,
+            command_ns: None,
+            frame_ns: None,
+            unacknowledged: 0,
+            asked_since_frame: false,
+            counts: Counts::default(),
+            box_index: [Some(0), Some(1), None, None],
+            order: None,
+            identity: Identity::default(),
+            said: Said::default(),
+        }
+    }
+
+    /// The port opened again: ask anew who is there, and keep the receiver's order until then, so that frames
+    /// can go on at once.
+    pub fn reopened(&mut self, now: u64) {
+        let order = self.order;
+        let throttle_us = self.said.throttle_us;
+        let msp_version = if self.version == Version::V1 { 1 } else { 2 };
+        *self = Self::new(now, msp_version);
+        self.order = order;
+        self.said.throttle_us = throttle_us;
+    }
+
+    /// Who the controller is.
+    #[must_use]
+    pub fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// Counts since the port opened.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        let refused = self.decoder.refused();
+        Counts {
+            refused: self.counts.refused.wrapping_add(refused.checksum).wrapping_add(refused.oversize),
+            junk: refused.bytes,
+            ..self.counts
+        }
+    }
+
+    /// Seconds since the last answer, or since the port opened.
+    #[must_use]
+    pub fn age_s(&self, now: u64) -> f32 {
+        now.saturating_sub(self.answer_ns.unwrap_or(self.opened_ns)) as f32 * 1e-9
+    }
+
+    /// Nothing came back for a second.
+    #[must_use]
+    pub fn silent(&self, now: u64) -> bool {
+        now.saturating_sub(self.answer_ns.unwrap_or(self.opened_ns)) >= SILENT_NS
+    }
+
+    /// Everything that is asked once is known.
+    #[must_use]
+    pub fn identified(&self) -> bool {
+        Question::ALL.into_iter().all(|question| !question.once() || self.settled[question as usize])
+    }
+
+    /// The controller says so.
+    #[must_use]
+    pub fn armed(&self) -> Option<bool> {
+        let (_, status) = self.said.status?;
+        Some(self.box_index[0].is_some_and(|index| status.mode(index.into())))
+    }
+
+    /// Mode bits in the order of `flight/state`.
+    #[must_use]
+    pub fn modes(&self) -> u32 {
+        let Some((_, status)) = self.said.status else { return 0 };
+        MODES.iter().zip(self.box_index).fold(0, |modes, ((_, bit), index)| {
+            if index.is_some_and(|index| status.mode(index.into())) { modes | bit } else { modes }
+        })
+    }
+
+    /// What blocks arming, when the firmware tells.
+    #[must_use]
+    pub fn blocks(&self) -> Option<Arming> {
+        self.said.status.and_then(|(_, status)| status.arming)
+    }
+
+    /// For the arm switch.
+    #[must_use]
+    pub fn evidence(&self, now: u64) -> Evidence {
+        let recent = |at: u64| now.saturating_sub(at) < STATUS_OLD_NS;
+        let clear = self.said.status.is_some_and(|(at, status)| {
+            let blocks = status.arming.map_or(0, |arming| arming.flags & !arming.arm_switch().unwrap_or(0));
+            recent(at) && blocks == 0
+        });
+        Evidence {
+            armed: self.armed(),
+            statuses: self.said.statuses,
+            clear,
+            ready: self.order.is_some() && self.frame_ns.is_some(),
+        }
+    }
+
+    /// Whether a frame can be sent: the receiver's order is known, or was waited for.
+    #[must_use]
+    pub fn order_settled(&self, now: u64) -> bool {
+        self.order.is_some() || now.saturating_sub(self.opened_ns) >= ORDER_WAIT_NS
+    }
+
+    /// When the last frame was sent.
+    #[must_use]
+    pub fn frame_ns(&self) -> Option<u64> {
+        self.frame_ns
+    }
+
+    /// Takes bytes from the port.
+    pub fn receive(&mut self, now: u64, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            self.byte_ns = now;
+        }
+        // Taken out for the time of the call: a frame borrows the decoder while it is looked at.
+        let mut decoder = core::mem::take(&mut self.decoder);
+        if bytes.is_empty() && decoder.in_frame() && now.saturating_sub(self.byte_ns) >= QUIET_NS {
+            decoder.abandon();
+            while let Some(frame) = decoder.pending() {
+                self.frame(now, &frame);
+            }
+        }
+        decoder.feed(bytes, |frame| self.frame(now, &frame));
+        self.decoder = decoder;
+    }
+
+    fn frame(&mut self, now: u64, frame: &Frame<'_>) {
+        if self.silent(now) {
+            // Whoever answers after a silence may have restarted, or be another one.
+            self.settled = [false; 10];
+        }
+        let answered = match frame.direction {
+            Direction::Request => false,
+            _ if frame.code == SetRawRc::CODE => self.acknowledged(frame.direction),
+            direction => match question_of(frame.code) {
+                Some(question) => self.answer(now, question, direction, frame.payload),
+                None => false,
+            },
+        };
+        if answered {
+            self.answer_ns = Some(now);
+            self.counts.answers = self.counts.answers.wrapping_add(1);
+        } else {
+            self.counts.refused = self.counts.refused.wrapping_add(1);
+        }
+    }
+
+    fn acknowledged(&mut self, direction: Direction) -> bool {
+        self.said.channels_refused = direction == Direction::Refusal;
+        let expected = self.unacknowledged > 0;
+        self.unacknowledged = self.unacknowledged.saturating_sub(1);
+        expected
+    }
+
+    fn answer(&mut self, now: u64, question: Question, direction: Direction, payload: &[u8]) -> bool {
+        let Some(sent_ns) = self.asked_ns[question as usize].take() else { return false };
+        let understood = direction == Direction::Refusal || self.understand(now, sent_ns, question, payload).is_ok();
+        if understood && question.once() {
+            self.settled[question as usize] = true;
+        }
+        understood
+    }
+
+    fn understand(
+        &mut self,
+        now: u64,
+        sent_ns: u64,
+        question: Question,
+        payload: &[u8],
+    ) -> Result<(), msp::TooShort> {
+        match question {
+            Question::Status => {
+                self.said.status = Some((now, parse_reply(&Status, payload)?));
+                self.said.statuses = self.said.statuses.wrapping_add(1);
+            }
+            Question::Map => {
+                let order = ReceiverOrder::read(&parse_reply(&RxMap, payload)?);
+                self.said.order_broken = order.is_none();
+                self.order = order;
+            }
+            Question::Rc => self.said.throttle_us = throttle_of(&parse_reply(&Rc, payload)?),
+            Question::Attitude => {
+                let reply = parse_reply(&Attitude, payload)?;
+                let sampled_ns = sent_ns + now.saturating_sub(sent_ns) / 2;
+                self.said.attitude = Some(AttitudeSample { sampled_ns, reply });
+            }
+            Question::Api => {
+                let reply = parse_reply(&ApiVersion, payload)?;
+                self.identity.api = Some((reply.major, reply.minor));
+            }
+            Question::Variant => self.identity.variant = parse_reply(&FcVariant, payload)?.letters,
+            Question::Version => {
+                let reply = parse_reply(&FcVersion, payload)?;
+                self.identity.version = [reply.major, reply.minor, reply.patch, 0];
+            }
+            Question::Boxes => {
+                let ids = parse_reply(&BoxIds, payload)?.ids;
+                for (slot, (id, _)) in self.box_index.iter_mut().zip(MODES) {
+                    let index = ids.iter().position(|listed| *listed == id);
+                    *slot = index.and_then(|index| u8::try_from(index).ok());
+                }
+            }
+            Question::Analog => self.said.analog = Some(parse_reply(&Analog, payload)?),
+            Question::Motor => self.said.motors_us = parse_reply(&Motor, payload)?.motors_us,
+        }
+        Ok(())
+    }
+
+    /// Writes a frame of channels (roll, pitch, throttle, yaw, AUX1...) and returns its length.
+    ///
+    /// # Errors
+    /// A channel out of range, or none; nothing is written then.
+    pub fn write_frame(
+        &mut self,
+        now: u64,
+        channels_us: &[u16; 18],
+        count: usize,
+        out: &mut [u8; MAX_FRAME],
+    ) -> Result<usize, FrameError> {
+        let order = self.order.unwrap_or(ReceiverOrder::AETR);
+        let (arranged, count) = order.arrange(channels_us, count.min(18));
+        let request = SetRawRc::new(arranged.get(..count).unwrap_or(&[])).map_err(FrameError::Channels)?;
+        let length = encode_request(out, self.version, &request).map_err(FrameError::Encode)?;
+        self.schedule.spend(now);
+        self.frame_ns = Some(now);
+        self.command_ns = Some(now);
+        self.asked_since_frame = false;
+        // One second of frames: what is older is never acknowledged any more.
+        self.unacknowledged = (self.unacknowledged + 1).min(50);
+        self.counts.frames = self.counts.frames.wrapping_add(1);
+        Ok(length)
+    }
+
+    /// Writes the next question, when one is due and there is room for it; returns its length.
+    ///
+    /// `eager`: the status is about to change. `orphan`: nobody has said yet which throttle is flown.
+    pub fn write_question(
+        &mut self,
+        now: u64,
+        eager: bool,
+        orphan: bool,
+        out: &mut [u8; MAX_FRAME],
+    ) -> Option<usize> {
+        for slot in &mut self.asked_ns {
+            if slot.is_some_and(|sent| now.saturating_sub(sent) >= LOST_NS) {
+                *slot = None;
+            }
+        }
+        let since = |at: Option<u64>| at.map_or(u64::MAX, |at| now.saturating_sub(at));
+        let spaced = if self.frame_ns.is_none() && since(self.answer_ns) == u64::MAX {
+            // Nothing is known yet and an aircraft may be in the air: the first questions go out together.
+            true
+        } else {
+            // One between two frames, in the middle.
+            since(self.command_ns) >= SPACING_NS && (!self.asked_since_frame || since(self.frame_ns) > 40_000_000)
+        };
+        if !spaced || self.asked_ns.iter().flatten().count() >= MOST_OUTSTANDING {
+            return None;
+        }
+        if eager || orphan {
+            self.schedule.hurry(if orphan && self.armed() == Some(true) { Question::Rc } else { Question::Status }, now);
+        }
+        let silent = self.silent(now);
+        let (asked, settled) = (&self.asked_ns, &self.settled);
+        let question = self.schedule.next(now, |question| {
+            let index = question as usize;
+            let wanted = if question.once() { !settled[index] } else { true };
+            wanted && asked[index].is_none() && (!silent || question == Question::Status)
+        })?;
+        let length = write(question, self.version, out).ok()?;
+        self.schedule.asked(question, now, eager);
+        self.schedule.spend(now);
+        self.asked_ns[question as usize] = Some(now);
+        self.command_ns = Some(now);
+        self.asked_since_frame = true;
+        Some(length)
+    }
+}
+
+/// Why a frame of channels was not written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameError {
+    /// A channel out of range, or none.
+    Channels(msp::messages::Refusal),
+    /// It does not fit.
+    Encode(EncodeError),
+}
+
+fn write(question: Question, version: Version, out: &mut [u8]) -> Result<usize, EncodeError> {
+    match question {
+        Question::Status => encode_request(out, version, &Status),
+        Question::Map => encode_request(out, version, &RxMap),
+        Question::Rc => encode_request(out, version, &Rc),
+        Question::Attitude => encode_request(out, version, &Attitude),
+        Question::Api => encode_request(out, version, &ApiVersion),
+        Question::Variant => encode_request(out, version, &FcVariant),
+        Question::Version => encode_request(out, version, &FcVersion),
+        Question::Boxes => encode_request(out, version, &BoxIds),
+        Question::Analog => encode_request(out, version, &Analog),
+        Question::Motor => encode_request(out, version, &Motor),
+    }
+}
+
+fn question_of(code: u16) -> Option<Question> {
+    Some(match code {
+        Status::CODE => Question::Status,
+        RxMap::CODE => Question::Map,
+        Rc::CODE => Question::Rc,
+        Attitude::CODE => Question::Attitude,
+        ApiVersion::CODE => Question::Api,
+        FcVariant::CODE => Question::Variant,
+        FcVersion::CODE => Question::Version,
+        BoxIds::CODE => Question::Boxes,
+        Analog::CODE => Question::Analog,
+        Motor::CODE => Question::Motor,
+        _ => return None,
+    })
+}

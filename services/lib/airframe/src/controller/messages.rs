@@ -1,0 +1,224 @@
+//! What the firmware answers: payloads of the MSP messages of FACTS 1.
+
+use super::personality::{FailsafeSettings, Personality, Procedure};
+use super::receiver::{CHANNELS, PITCH, ROLL, Receiver, THROTTLE, YAW};
+
+const API_VERSION: u16 = 1;
+const FC_VARIANT: u16 = 2;
+const FC_VERSION: u16 = 3;
+const MODE_RANGES: u16 = 34;
+const FEATURE_CONFIG: u16 = 36;
+const RX_CONFIG: u16 = 44;
+const RX_MAP: u16 = 64;
+const FAILSAFE_CONFIG: u16 = 75;
+const RXFAIL_CONFIG: u16 = 77;
+const STATUS: u16 = 101;
+const MOTOR: u16 = 104;
+const RC: u16 = 105;
+const ATTITUDE: u16 = 108;
+const ALTITUDE: u16 = 109;
+const ANALOG: u16 = 110;
+const BOX_NAMES: u16 = 116;
+const BOX_IDS: u16 = 119;
+const STATUS_EX: u16 = 150;
+pub(super) const SET_RAW_RC: u16 = 200;
+pub(super) const SET_MOTOR: u16 = 214;
+
+/// Outputs that the firmware knows; a quadrotor uses the first four.
+pub(super) const MOTORS: usize = 8;
+/// Slots of MSP_MODE_RANGES.
+const MODE_SLOTS: usize = 20;
+/// Gyro, accelerometer, magnetometer present: bits of the sensor word.
+const SENSORS: u16 = 1 | 1 << 2 | 1 << 5;
+/// Receiver over MSP and air mode: bits 14 and 22 of the feature word.
+const FEATURES: u32 = 1 << 14 | 1 << 22;
+/// Permanent ids of the boxes whose state is told.
+const BOX_ARM: u8 = 0;
+const BOX_ANGLE: u8 = 1;
+const BOX_FAILSAFE: u8 = 27;
+
+/// What answers are made of.
+pub(super) struct View<'a> {
+    pub(super) personality: &'a Personality,
+    pub(super) failsafe: &'a FailsafeSettings,
+    pub(super) receiver: &'a Receiver,
+    pub(super) motors_us: &'a [u16; MOTORS],
+    pub(super) roll_rad: f64,
+    pub(super) pitch_rad: f64,
+    pub(super) heading_rad: f64,
+    pub(super) volts: f64,
+    pub(super) amps: f64,
+    pub(super) drawn_mah: f64,
+}
+
+/// A payload in the making; what does not fit is left out.
+pub(super) struct Payload {
+    bytes: [u8; 256],
+    length: usize,
+}
+
+impl Payload {
+    pub(super) fn new() -> Self {
+        Self { bytes: [0; 256], length: 0 }
+    }
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes[..self.length]
+    }
+    fn put(&mut self, bytes: &[u8]) {
+        let end = (self.length + bytes.len()).min(self.bytes.len());
+        let fits = end - self.length;
+        self.bytes[self.length..end].copy_from_slice(&bytes[..fits]);
+        self.length = end;
+    }
+    fn u8(&mut self, value: u8) {
+        self.put(&[value]);
+    }
+    fn u16(&mut self, value: u16) {
+        self.put(&value.to_le_bytes());
+    }
+    fn i16(&mut self, value: f64) {
+        self.put(&(value as i16).to_le_bytes());
+    }
+    fn u32(&mut self, value: u32) {
+        self.put(&value.to_le_bytes());
+    }
+    fn pad_to(&mut self, length: usize) {
+        self.length = length.min(self.bytes.len());
+    }
+}
+
+/// Writes the answer; `false` for a message that this firmware does not know.
+pub(super) fn answer(code: u16, view: &View<'_>, out: &mut Payload) -> bool {
+    let p = view.personality;
+    match code {
+        API_VERSION => out.put(&p.api),
+        FC_VARIANT => out.put(&p.variant),
+        FC_VERSION => {
+            out.put(&p.version);
+            if !p.version_text.is_empty() {
+                out.u8(p.version_text.len() as u8);
+                out.put(p.version_text.as_bytes());
+            }
+        }
+        MODE_RANGES => mode_ranges(out),
+        FEATURE_CONFIG => out.u32(FEATURES),
+        RX_CONFIG => rx_config(p, out),
+        RX_MAP => out.put(&p.rx_map),
+        FAILSAFE_CONFIG => failsafe_config(view.failsafe, out),
+        RXFAIL_CONFIG => rxfail_config(view.failsafe, out),
+        STATUS | STATUS_EX => status(code == STATUS_EX, view, out),
+        MOTOR => view.motors_us.iter().for_each(|motor| out.u16(*motor)),
+        RC => rc(view.receiver, out),
+        ATTITUDE => attitude(view, out),
+        // No barometer on this board: height and climb are zero.
+        ALTITUDE => out.pad_to(6),
+        ANALOG => analog(view, out),
+        BOX_NAMES => {
+            for (_, name) in p.boxes {
+                out.put(name.as_bytes());
+                out.u8(b';');
+            }
+        }
+        BOX_IDS => p.boxes.iter().for_each(|(id, _)| out.u8(*id)),
+        _ => return false,
+    }
+    true
+}
+
+/// Roll, pitch, YAW, THROTTLE: not the order of SET_RAW_RC (FACTS 1).
+fn rc(receiver: &Receiver, out: &mut Payload) {
+    let values = receiver.values();
+    for channel in [ROLL, PITCH, YAW, THROTTLE] {
+        out.u16(values[channel]);
+    }
+    values[4..].iter().for_each(|value| out.u16(*value));
+}
+
+/// Tenths of degrees; yaw whole degrees clockwise, cut off and not rounded.
+fn attitude(view: &View<'_>, out: &mut Payload) {
+    out.i16((view.roll_rad.to_degrees() * 10.0).round());
+    out.i16((view.pitch_rad.to_degrees() * 10.0).round());
+    let clockwise = (-view.heading_rad.to_degrees()).rem_euclid(360.0);
+    out.u16((clockwise as u16) % 360);
+}
+
+fn analog(view: &View<'_>, out: &mut Payload) {
+    out.u8((view.volts * 10.0).round().clamp(0.0, 255.0) as u8);
+    out.u16(view.drawn_mah.clamp(0.0, 65535.0) as u16);
+    out.u16(if view.receiver.is_lost() { 0 } else { 1023 });
+    out.i16((view.amps * 100.0).clamp(-32000.0, 32000.0));
+    out.u16((view.volts * 100.0).round().clamp(0.0, 65535.0) as u16);
+}
+
+fn status(extended: bool, view: &View<'_>, out: &mut Payload) {
+    let p = view.personality;
+    let mut modes = 0_u32;
+    for (index, (id, _)) in p.boxes.iter().enumerate() {
+        let on = match *id {
+            BOX_ARM => view.receiver.is_armed(),
+            BOX_ANGLE => view.receiver.is_angle(),
+            BOX_FAILSAFE => view.receiver.is_failsafe(),
+            _ => false,
+        };
+        modes |= u32::from(on) << (index % 32);
+    }
+    out.u16(125);
+    out.u16(0);
+    out.u16(SENSORS);
+    out.u32(modes);
+    out.u8(0);
+    out.u16(12);
+    if extended {
+        out.u8(4);
+        out.u8(0);
+    } else {
+        out.u16(0);
+    }
+    // No further mode bytes: all boxes fit in the word.
+    out.u8(0);
+    out.u8((p.arm_switch_bit + 1) as u8);
+    out.u32(view.receiver.blocks());
+    out.u8(0);
+    out.u16(41);
+    out.pad_to(out.length + p.status_tail);
+}
+
+/// ARM on AUX1 and ANGLE on AUX2, from 1700 to 2100: in steps of 25 us from 900.
+fn mode_ranges(out: &mut Payload) {
+    out.put(&[BOX_ARM, 0, 32, 48]);
+    out.put(&[BOX_ANGLE, 1, 32, 48]);
+    out.pad_to(4 * MODE_SLOTS);
+}
+
+fn rx_config(personality: &Personality, out: &mut Payload) {
+    // Serial provider 0, stick ends, bind count, pulse limits.
+    out.u8(0);
+    out.u16(1900);
+    out.u16(1500);
+    out.u16(personality.low_throttle_us);
+    out.u8(0);
+    out.u16(885);
+    out.u16(2115);
+    out.pad_to(personality.rx_config_length);
+}
+
+fn failsafe_config(settings: &FailsafeSettings, out: &mut Payload) {
+    out.u8(settings.delay_ds);
+    out.u8(settings.landing_s);
+    out.u16(settings.throttle_us);
+    out.u8(0);
+    out.u16(100);
+    out.u8(match settings.procedure {
+        Procedure::AutoLand => 0,
+        Procedure::Drop => 1,
+    });
+}
+
+/// Mode (0 automatic, 1 hold, 2 value) and value of each channel, roll pitch yaw throttle first.
+fn rxfail_config(settings: &FailsafeSettings, out: &mut Payload) {
+    for channel in 0..CHANNELS {
+        let hold = channel > 3 || channel == THROTTLE && settings.hold_throttle;
+        out.u8(u8::from(hold));
+        out.u16(1500);
+    }
+}

@@ -1,0 +1,240 @@
+//! The receiver (MSP frames), loss of signal, failsafe, modes and arming.
+
+use super::personality::{FailsafeSettings, Personality, Procedure, block};
+
+/// Channels of the firmware.
+pub(crate) const CHANNELS: usize = 18;
+pub(crate) const ROLL: usize = 0;
+pub(crate) const PITCH: usize = 1;
+pub(crate) const YAW: usize = 2;
+pub(crate) const THROTTLE: usize = 3;
+const AUX1: usize = 4;
+const AUX2: usize = 5;
+/// Values that count as a pulse (FACTS 1).
+const VALID_US: core::ops::RangeInclusive<u16> = 885..=2115;
+const CENTRE_US: u16 = 1500;
+const LOWEST_US: u16 = 885;
+/// Switched on: the upper third, as installers set ranges.
+const SWITCH_US: u16 = 1700;
+/// More tilted than this it will not arm (`small_angle`, 25 degrees).
+const SMALL_ANGLE_RAD: f64 = 0.436;
+/// The gyro is calibrated this long after power-up.
+const CALIBRATION_NS: u64 = 1_500_000_000;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Failsafe {
+    Idle,
+    /// Level and at the failsafe throttle until then.
+    Landing(u64),
+    /// Disarmed by it; `Some` since when frames with the arm switch low have come again.
+    Latched(Option<u64>),
+}
+
+/// Receiver, failsafe and arming.
+#[derive(Clone, Debug)]
+pub(crate) struct Receiver {
+    /// Firmware order: roll, pitch, yaw, throttle, AUX...
+    values: [u16; CHANNELS],
+    good_ns: [u64; CHANNELS],
+    valid_ns: Option<u64>,
+    recovering_ns: Option<u64>,
+    lost: bool,
+    failsafe: Failsafe,
+    armed: bool,
+    latched: bool,
+    switched_ns: Option<u64>,
+    blocks: u32,
+    armings: u32,
+}
+
+impl Receiver {
+    pub(crate) fn new() -> Self {
+        let mut values = [CENTRE_US; CHANNELS];
+        values[THROTTLE] = LOWEST_US;
+        Self {
+            values,
+            good_ns: [0; CHANNELS],
+            valid_ns: None,
+            recovering_ns: None,
+            lost: true,
+            failsafe: Failsafe::Idle,
+            armed: false,
+            latched: false,
+            switched_ns: None,
+            blocks: block::RX_LOSS | block::BOOT_GRACE | block::CALIBRATING,
+            armings: 0,
+        }
+    }
+
+    /// A frame in the receiver's order; at most [`CHANNELS`] values. What it does not carry reads as 0.
+    pub(crate) fn frame(&mut self, now_ns: u64, frame: &[u16], personality: &Personality) {
+        let mut flight_valid = true;
+        for channel in 0..CHANNELS {
+            let place = personality.rx_map.get(channel).map_or(channel, |place| usize::from(*place));
+            let value = frame.get(place).copied().unwrap_or(0);
+            if VALID_US.contains(&value) {
+                self.good_ns[channel] = now_ns;
+                self.values[channel] = value;
+            } else if channel < 4 {
+                flight_valid = false;
+            }
+        }
+        if flight_valid {
+            self.valid_ns = Some(now_ns);
+        }
+    }
+
+    /// The slow pass: loss, failsafe, arming.
+    pub(crate) fn pass(
+        &mut self,
+        now_ns: u64,
+        tilt_rad: f64,
+        personality: &Personality,
+        settings: &FailsafeSettings,
+    ) {
+        self.look_for_loss(now_ns, personality);
+        self.drop_stale_sticks(now_ns, personality, settings);
+        self.run_failsafe(now_ns, personality, settings);
+        self.run_arming(now_ns, tilt_rad, personality);
+    }
+
+    fn look_for_loss(&mut self, now_ns: u64, personality: &Personality) {
+        let silent = self.valid_ns.is_none_or(|valid| now_ns - valid > personality.loss_ns);
+        if silent {
+            self.lost = true;
+            self.recovering_ns = None;
+        } else if self.lost {
+            let since = *self.recovering_ns.get_or_insert(now_ns);
+            if now_ns - since >= personality.recovery_ns {
+                self.lost = false;
+                self.recovering_ns = None;
+            }
+        }
+    }
+
+    /// Stage one: a flight channel without a valid pulse is centred, the throttle goes to the bottom.
+    fn drop_stale_sticks(&mut self, now_ns: u64, personality: &Personality, settings: &FailsafeSettings) {
+        for channel in [ROLL, PITCH, YAW, THROTTLE] {
+            if now_ns - self.good_ns[channel] <= personality.hold_ns {
+                continue;
+            }
+            if channel != THROTTLE {
+                self.values[channel] = CENTRE_US;
+            } else if !settings.hold_throttle {
+                self.values[channel] = LOWEST_US;
+            }
+        }
+    }
+
+    /// Stage two.
+    fn run_failsafe(&mut self, now_ns: u64, personality: &Personality, settings: &FailsafeSettings) {
+        let silent_ns = now_ns - self.valid_ns.unwrap_or(0);
+        match self.failsafe {
+            Failsafe::Idle => {
+                if self.armed && self.lost && silent_ns >= u64::from(settings.delay_ds) * 100_000_000 {
+                    self.failsafe = match settings.procedure {
+                        Procedure::Drop => {
+                            self.armed = false;
+                            Failsafe::Latched(None)
+                        }
+                        Procedure::AutoLand => {
+                            Failsafe::Landing(now_ns + u64::from(settings.landing_s) * 1_000_000_000)
+                        }
+                    };
+                }
+            }
+            Failsafe::Landing(until_ns) => {
+                if !self.lost {
+                    self.failsafe = Failsafe::Idle;
+                } else if now_ns >= until_ns || !self.armed {
+                    self.armed = false;
+                    self.failsafe = Failsafe::Latched(None);
+                }
+            }
+            Failsafe::Latched(since) => {
+                let quiet = !self.lost && self.values[AUX1] < SWITCH_US;
+                self.failsafe = match since {
+                    _ if !quiet => Failsafe::Latched(None),
+                    None => Failsafe::Latched(Some(now_ns)),
+                    Some(since) if now_ns - since >= personality.rearm_ns - personality.recovery_ns => {
+                        Failsafe::Idle
+                    }
+                    since => Failsafe::Latched(since),
+                };
+            }
+        }
+    }
+
+    fn run_arming(&mut self, now_ns: u64, tilt_rad: f64, personality: &Personality) {
+        let mut blocks = 0;
+        let mut raise = |wrong: bool, flag: u32| {
+            if wrong {
+                blocks |= flag;
+            }
+        };
+        raise(matches!(self.failsafe, Failsafe::Latched(_)), block::FAILSAFE);
+        raise(self.lost, block::RX_LOSS);
+        raise(self.values[THROTTLE] > personality.low_throttle_us, block::THROTTLE);
+        raise(tilt_rad > SMALL_ANGLE_RAD, block::ANGLE);
+        raise(now_ns < personality.boot_grace_ns, block::BOOT_GRACE);
+        raise(now_ns < CALIBRATION_NS, block::CALIBRATING);
+
+        if self.values[AUX1] < SWITCH_US {
+            self.armed = false;
+            self.latched = false;
+            self.switched_ns = None;
+        } else if !self.armed {
+            // The switch is up while something stands in the way: it must go down before it counts again.
+            if blocks != 0 {
+                self.latched = true;
+                self.switched_ns = None;
+            }
+            if !self.latched {
+                let since = *self.switched_ns.get_or_insert(now_ns);
+                if now_ns - since >= personality.arm_delay_ns {
+                    self.armed = true;
+                    self.armings += 1;
+                }
+            }
+        }
+        if self.latched {
+            blocks |= 1 << personality.arm_switch_bit;
+        }
+        if self.armed {
+            blocks = 0;
+        }
+        self.blocks = blocks;
+    }
+
+    /// What the sticks say now, failsafe included: roll, pitch, yaw, throttle.
+    pub(crate) fn sticks(&self, settings: &FailsafeSettings) -> [u16; 4] {
+        if matches!(self.failsafe, Failsafe::Landing(_)) {
+            return [CENTRE_US, CENTRE_US, CENTRE_US, settings.throttle_us];
+        }
+        [self.values[ROLL], self.values[PITCH], self.values[YAW], self.values[THROTTLE]]
+    }
+
+    pub(crate) fn values(&self) -> &[u16; CHANNELS] {
+        &self.values
+    }
+    pub(crate) fn is_armed(&self) -> bool {
+        self.armed
+    }
+    pub(crate) fn is_lost(&self) -> bool {
+        self.lost
+    }
+    /// ANGLE is flown by its switch, and by the failsafe's own landing.
+    pub(crate) fn is_angle(&self) -> bool {
+        self.values[AUX2] >= SWITCH_US || self.is_failsafe()
+    }
+    pub(crate) fn is_failsafe(&self) -> bool {
+        self.failsafe != Failsafe::Idle
+    }
+    pub(crate) fn blocks(&self) -> u32 {
+        self.blocks
+    }
+    /// How often it was armed.
+    pub(crate) fn armings(&self) -> u32 {
+        self.armings
+    }
+}

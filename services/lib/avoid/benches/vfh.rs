@@ -1,0 +1,53 @@
+//! One avoidance step: scroll, eight beams, walls, histogram, decision (target: 20 us).
+#![allow(clippy::unwrap_used, missing_docs, reason = "bench")]
+
+use avoid::grid::{insert, scroll};
+use avoid::{
+    Avoider, Beam, CELLS, Echo, GridRules, Histogram, SECTORS, Situation, Vfh, VfhConfig, WallLayer, Window,
+};
+use criterion::{Criterion, criterion_group, criterion_main};
+use std::f32::consts::TAU;
+use std::hint::black_box;
+
+/// A corridor 2.2 m wide along x with doors, walls 15 cm thick.
+fn solid(x: f32, y: f32) -> bool {
+    (1.1..1.25).contains(&y.abs()) && x.rem_euclid(3.0) > 0.9
+}
+
+fn step(c: &mut Criterion) {
+    let mut vfh = Vfh::new(VfhConfig::flight(0.225)).unwrap();
+    let rules = GridRules::default();
+    let mut walls = WallLayer::new();
+    let mut window = Window::around(0.0, 0.0).unwrap();
+    let (mut cells, mut next) = (vec![0u8; CELLS], vec![0u8; CELLS]);
+    let (mut raw, mut smoothed, mut blocked) = ([0.0; SECTORS], [0.0; SECTORS], [0; SECTORS]);
+    let mut x = 0.0f32;
+    c.bench_function("vfh_step_81x81_flight", |b| {
+        b.iter(|| {
+            // 0.5 m/s at 20 Hz.
+            x = (x + 0.025) % 100.0;
+            let to = Window::around(x, 0.0).unwrap();
+            scroll(&cells, &window, &mut next, &to, 1);
+            std::mem::swap(&mut cells, &mut next);
+            window = to;
+            walls.follow(&window, solid);
+            for k in 0..8 {
+                let echo = if k % 3 == 0 { Echo::Obstacle(0.9 + 0.1 * k as f32) } else { Echo::Mapped(1.1) };
+                let beam = Beam { x_m: x, y_m: 0.0, angle_rad: k as f32 * TAU / 8.0, echo };
+                insert(&mut cells, &window, &rules, &beam);
+            }
+            let situation = Situation {
+                cells: &cells,
+                walls: walls.cells(),
+                target_rad: 0.1,
+                target_m: 1.2,
+                max_speed_m_s: 0.5,
+            };
+            let mut histogram = Histogram { raw: &mut raw, smoothed: &mut smoothed, blocked: &mut blocked };
+            black_box(vfh.decide(&situation, &mut histogram))
+        });
+    });
+}
+
+criterion_group!(benches, step);
+criterion_main!(benches);

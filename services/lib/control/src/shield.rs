@@ -1,0 +1,360 @@
+//! The shield: every wish for motion passes it, whoever wishes.
+//!
+//! It trusts only what the drone's own sonars say now, the walls of the plan around the pose, and the braking
+//! law. No sensor looking that way, no motion that way.
+
+use crate::braking::Braking;
+use crate::check::{RangeError, within};
+use crate::held::seconds;
+use crate::planar::{Vector, wrap_angle};
+use floorplan::DistanceField;
+
+/// Most sonars around.
+pub const MAX_SENSORS: usize = 16;
+
+/// Settings of the shield.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ShieldConfig {
+    /// Room kept between disc and echo on top of the stopping distance, metres. A centred disc of 0.45 m has
+    /// 0.225 m on each side of a door of 0.9 m.
+    pub margin_m: f32,
+    /// Things nearer to the disc than this are moved away from, metres (FACTS 8: within 0.55 m of the middle).
+    pub near_m: f32,
+    /// Speed away for each metre nearer than `near_m`, 1/s: both jambs of a door push alike, which centres.
+    pub push_gain_per_s: f32,
+    /// Fastest push, m/s.
+    pub max_push_m_s: f32,
+    /// Half-angle of what a sonar can vouch for, degrees: 22.5 joins eight, the rest is its cone.
+    pub look_half_angle_deg: f32,
+    /// Half-angle of the cone in which an echo may lie, degrees (FACTS 2).
+    pub cone_half_angle_deg: f32,
+    /// Delay of the braking law beside the sweep, seconds (FACTS 2).
+    pub reaction_s: f32,
+    /// Deceleration of the braking law, m/s2 (FACTS 2).
+    pub deceleration_m_s2: f32,
+    /// Readings older than so many of the sensor's turns are worth nothing (DESIGN 4).
+    pub stale_turns: f32,
+    /// Room kept to the plan's walls beside the disc and the pose's sigma, metres: the plan is 3 cm wrong.
+    pub plan_margin_m: f32,
+    /// Speed at which the drone may still go where only a doubtful pose, and no echo, sees a wall, m/s.
+    pub creep_m_s: f32,
+    /// Most of the disc that the pose may put inside a wall of the plan while the sonars say free, metres.
+    pub plan_overlap_m: f32,
+}
+
+impl Default for ShieldConfig {
+    fn default() -> Self {
+        Self {
+            margin_m: 0.05,
+            near_m: 0.30,
+            push_gain_per_s: 0.5,
+            max_push_m_s: 0.12,
+            look_half_angle_deg: 28.0,
+            cone_half_angle_deg: 15.0,
+            reaction_s: 0.35,
+            deceleration_m_s2: 2.0,
+            stale_turns: 2.0,
+            plan_margin_m: 0.03,
+            creep_m_s: 0.15,
+            plan_overlap_m: 0.08,
+        }
+    }
+}
+
+impl ShieldConfig {
+    /// # Errors
+    /// When a value is outside its bounds.
+    pub fn validate(&self) -> Result<(), RangeError> {
+        within("shield.margin_m", self.margin_m, 0.0, 0.2)?;
+        within("shield.near_m", self.near_m, 0.0, 0.6)?;
+        within("shield.push_gain_per_s", self.push_gain_per_s, 0.0, 2.0)?;
+        within("shield.max_push_m_s", self.max_push_m_s, 0.0, 0.3)?;
+        within("shield.look_half_angle_deg", self.look_half_angle_deg, 15.0, 45.0)?;
+        within("shield.cone_half_angle_deg", self.cone_half_angle_deg, 5.0, 30.0)?;
+        within("shield.reaction_s", self.reaction_s, 0.2, 1.0)?;
+        within("shield.deceleration_m_s2", self.deceleration_m_s2, 0.5, 2.5)?;
+        within("shield.stale_turns", self.stale_turns, 1.5, 4.0)?;
+        within("shield.plan_margin_m", self.plan_margin_m, 0.0, 0.2)?;
+        within("shield.creep_m_s", self.creep_m_s, 0.0, 0.3)?;
+        within("shield.plan_overlap_m", self.plan_overlap_m, 0.0, 0.15)
+    }
+}
+
+/// What a ping of a side sonar brought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Echo {
+    /// Something at this distance from the sensor's face, metres.
+    Range(f32),
+    /// The sensor works and heard nothing.
+    Nothing,
+}
+
+/// One ping of one side sonar.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// When the ping left.
+    pub at_ns: u64,
+    /// Heading of the body then, plan frame.
+    pub heading: f32,
+    /// What came back.
+    pub echo: Echo,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sensor {
+    bearing: f32,
+    mount: Vector,
+    look: Option<Look>,
+}
+
+/// Where the drone stands on the plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footing {
+    /// Plan frame; `None` when it is not known.
+    pub place: Option<Vector>,
+    /// Larger standard deviation of the place, metres.
+    pub sigma_m: f32,
+    /// Plan frame.
+    pub heading: f32,
+}
+
+/// What the shield made of a wish.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guarded {
+    /// To be flown, plan frame.
+    pub velocity: Vector,
+    /// Speed that can still be stopped in the wished direction, m/s.
+    pub allowed_m_s: f32,
+    /// Whether less than the wish is left.
+    pub limited: bool,
+}
+
+/// The shield.
+#[derive(Clone, Debug)]
+pub struct Shield {
+    config: ShieldConfig,
+    radius_m: f32,
+    sensors: [Option<Sensor>; MAX_SENSORS],
+    sweep_s: f32,
+}
+
+/// Free way beyond which nothing matters at indoor speeds, metres.
+const FAR_M: f32 = 4.0;
+/// Directions within a cone that an echo is tried at.
+const ARC: [f32; 7] = [-1.0, -0.667, -0.333, 0.0, 0.333, 0.667, 1.0];
+/// A wish is turned into the nearest watched direction when that is nearer than this, radians.
+const BEND_RAD: f32 = 0.87;
+
+impl Shield {
+    /// For a disc of this radius and sonars given by index, azimuth of the axis (body frame, counter-clockwise
+    /// from forward) and position of the face (body frame). Sonars that look down do not belong here.
+    pub fn new(
+        config: ShieldConfig,
+        radius_m: f32,
+        sonars: impl IntoIterator<Item = (usize, f32, Vector)>,
+    ) -> Self {
+        let mut sensors = [None; MAX_SENSORS];
+        for (index, bearing, mount) in sonars {
+            if let Some(slot) = sensors.get_mut(index) {
+                *slot = Some(Sensor { bearing, mount, look: None });
+            }
+        }
+        Self { config, radius_m, sensors, sweep_s: 0.24 }
+    }
+
+    /// Sets the period of a whole sweep through all sonars, seconds.
+    pub fn set_sweep(&mut self, sweep_s: f32) {
+        if sweep_s.is_finite() {
+            self.sweep_s = sweep_s.clamp(0.05, 2.0);
+        }
+    }
+
+    /// Takes a ping. Faults and sensors known to be stuck are not to be told: they fall silent. False when
+    /// there is no such side sonar or the ping makes no sense.
+    pub fn hear(&mut self, sensor: usize, look: Look) -> bool {
+        let sane = match look.echo {
+            Echo::Range(range) => range > 0.0 && range < 20.0,
+            Echo::Nothing => true,
+        };
+        match self.sensors.get_mut(sensor) {
+            Some(Some(sensor)) if sane && look.heading.is_finite() => {
+                sensor.look = Some(look);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// The braking law at the present sweep.
+    #[must_use]
+    pub fn braking(&self) -> Braking {
+        Braking {
+            delay_s: self.sweep_s + self.config.reaction_s,
+            deceleration_m_s2: self.config.deceleration_m_s2,
+        }
+    }
+
+    /// Side sonars silent for two of their turns, and side sonars at all.
+    #[must_use]
+    pub fn silent(&self, now: u64) -> (u32, u32) {
+        let all = self.sensors.iter().flatten();
+        all.fold((0, 0), |(silent, all), s| (silent + u32::from(self.fresh(s, now).is_none()), all + 1))
+    }
+
+    fn fresh(&self, sensor: &Sensor, now: u64) -> Option<Look> {
+        sensor.look.filter(|look| seconds(look.at_ns, now) <= self.config.stale_turns * self.sweep_s)
+    }
+
+    /// Nearest echo to the disc's edge among fresh readings, metres; infinite without one.
+    #[must_use]
+    pub fn nearest_m(&self, now: u64) -> f32 {
+        self.hits(now).map(|(_, centre)| centre.norm() - self.radius_m).fold(f32::INFINITY, f32::min)
+    }
+
+    /// Fresh echoes: the plan-frame axis with the sensor's face, and the point on the axis, from the middle.
+    fn hits(&self, now: u64) -> impl Iterator<Item = ((f32, Vector, f32), Vector)> + '_ {
+        self.sensors.iter().flatten().filter_map(move |sensor| {
+            let look = self.fresh(sensor, now)?;
+            let Echo::Range(range) = look.echo else { return None };
+            let axis = sensor.bearing + look.heading;
+            let face = sensor.mount.rotated(look.heading);
+            Some(((axis, face, range), face + Vector::along(axis) * range))
+        })
+    }
+
+    /// Free way of the disc with its margin in a direction (unit vector, plan frame) by the echoes alone,
+    /// metres: an echo may come from anywhere on the arc across its cone, and the worst place counts.
+    #[must_use]
+    pub fn free_way(&self, now: u64, direction: Vector) -> f32 {
+        let wide = self.radius_m + self.config.margin_m;
+        let half = self.config.cone_half_angle_deg.to_radians();
+        let mut free = FAR_M;
+        for ((axis, face, range), _) in self.hits(now) {
+            for part in ARC {
+                let point = face + Vector::along(axis + part * half) * range;
+                let ahead = point.dot(direction);
+                let aside = point.cross(direction).abs();
+                if ahead > 0.0 && aside < wide {
+                    free = free.min((ahead - (wide * wide - aside * aside).sqrt()).max(0.0));
+                }
+            }
+        }
+        free
+    }
+
+    /// Free way of a disc of `radius` by the plan's walls. Inside the radius sliding along and away is free.
+    fn plan_way(walls: &DistanceField, from: Vector, direction: Vector, radius: f32) -> f32 {
+        let mut way = 0.0;
+        let mut before = walls.distance(from.x, from.y);
+        let mut within = before < radius;
+        while way < FAR_M {
+            let step = (before - radius).max(0.03);
+            let at = from + direction * (way + step);
+            let distance = walls.distance(at.x, at.y);
+            within = within && distance < radius;
+            if distance < radius && (!within || distance < before - 0.2 * step) {
+                return way;
+            }
+            before = distance;
+            way += step;
+        }
+        FAR_M
+    }
+
+    /// The nearest direction (body frame) that a healthy sonar watches, and how far off it is.
+    fn watched(&self, now: u64, bearing: f32) -> Option<(f32, f32)> {
+        let half = self.config.look_half_angle_deg.to_radians();
+        let mut best: Option<(f32, f32)> = None;
+        for sensor in self.sensors.iter().flatten() {
+            if self.fresh(sensor, now).is_none() {
+                continue;
+            }
+            let off = wrap_angle(bearing - sensor.bearing);
+            let beyond = off.abs() - half;
+            if beyond <= 0.0 {
+                return Some((bearing, 0.0));
+            }
+            if best.is_none_or(|(_, least)| beyond < least) {
+                // A hair inside, so that rounding does not put it outside again.
+                best = Some((sensor.bearing + half.copysign(off) * 0.999, beyond));
+            }
+        }
+        best
+    }
+
+    /// The speed that may be flown in a direction (unit vector, plan frame).
+    fn allowed(&self, now: u64, direction: Vector, footing: &Footing, walls: Option<&DistanceField>) -> f32 {
+        if self.watched(now, wrap_angle(direction.angle() - footing.heading)).is_none_or(|(_, off)| off > 0.0) {
+            return 0.0;
+        }
+        let c = &self.config;
+        let braking = self.braking();
+        let speed = braking.speed(self.free_way(now, direction));
+        let (Some(walls), Some(place)) = (walls, footing.place) else { return speed };
+        let sigma = if footing.sigma_m.is_finite() { footing.sigma_m.clamp(0.0, 0.08) } else { 0.08 };
+        let soft = Self::plan_way(walls, place, direction, self.radius_m + c.plan_margin_m + sigma);
+        let hard = Self::plan_way(walls, place, direction, (self.radius_m - c.plan_overlap_m).max(0.05));
+        speed.min(braking.speed(soft).max(c.creep_m_s.min(braking.speed(hard))))
+    }
+
+    /// Passes a wish (plan frame, m/s): what is left can be stopped before anything that is seen.
+    pub fn guard(
+        &self,
+        now: u64,
+        wish: Vector,
+        footing: &Footing,
+        walls: Option<&DistanceField>,
+        may_push: bool,
+    ) -> Guarded {
+        let wish = wish.known().unwrap_or(Vector::ZERO);
+        let braking = self.braking();
+        let mut velocity = wish;
+        let mut push = Vector::ZERO;
+        // What points at a near thing is taken out of the wish, so that the rest may slide along it.
+        for _ in 0..2 {
+            for (_, centre) in self.hits(now) {
+                let distance = centre.norm();
+                let towards = if distance > 1e-3 { centre * (1.0 / distance) } else { continue };
+                let most = braking.speed(distance - self.radius_m - self.config.margin_m);
+                let excess = velocity.dot(towards) - most;
+                if excess > 0.0 {
+                    velocity = velocity - towards * excess;
+                }
+            }
+        }
+        if may_push {
+            for (_, centre) in self.hits(now) {
+                let distance = centre.norm().max(1e-3);
+                let missing = self.config.near_m - (distance - self.radius_m);
+                if missing > 0.0 {
+                    push = push - centre * (self.config.push_gain_per_s * missing / distance);
+                }
+            }
+            velocity += push.limited(self.config.max_push_m_s);
+        }
+        let speed = velocity.norm();
+        if speed > 1e-4 {
+            let bearing = wrap_angle(velocity.angle() - footing.heading);
+            velocity = match self.watched(now, bearing) {
+                Some((_, 0.0)) => velocity,
+                Some((edge, off)) if off < BEND_RAD => {
+                    Vector::along(edge + footing.heading) * (speed * off.cos())
+                }
+                _ => Vector::ZERO,
+            };
+        }
+        let speed = velocity.norm();
+        if speed > 1e-4 {
+            velocity = velocity.limited(self.allowed(now, velocity * (1.0 / speed), footing, walls));
+        }
+        let wished = wish.norm();
+        let allowed_m_s =
+            if wished > 1e-3 { self.allowed(now, wish * (1.0 / wished), footing, walls) } else { 0.0 };
+        Guarded {
+            velocity: velocity.known().unwrap_or(Vector::ZERO),
+            allowed_m_s,
+            limited: (velocity - wish).norm() > 0.02,
+        }
+    }
+}

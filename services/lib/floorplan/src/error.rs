@@ -1,0 +1,118 @@
+use thiserror::Error;
+
+/// What is wrong with a plan, its picture or its sidecar file.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum PlanError {
+    /// The header or the sidecar is not readable yaml of the expected shape.
+    #[error("{file}: cannot be read: {reason}")]
+    Syntax {
+        /// The file.
+        file: String,
+        /// What the parser said, on one line.
+        reason: String,
+    },
+    /// A key that must be there is not.
+    #[error("{file}: `{field}` is missing: {hint}")]
+    Missing {
+        /// The file.
+        file: String,
+        /// The key.
+        field: &'static str,
+        /// What belongs there.
+        hint: &'static str,
+    },
+    /// A value outside its range.
+    #[error("{file}: `{field}` is {value}, allowed is {allowed}")]
+    Range {
+        /// The file.
+        file: String,
+        /// The key.
+        field: String,
+        /// What stands there.
+        value: String,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// A plan whose origin is turned against its picture.
+    #[error(
+        "{file}: `origin` turns the plan by {yaw_rad} rad: turned plans are not supported, turn the picture \
+         and set the third number to 0"
+    )]
+    Turned {
+        /// The file.
+        file: String,
+        /// The third number of `origin`.
+        yaw_rad: f64,
+    },
+    /// The picture does not decode.
+    #[error("{file}: the picture `{picture}` is not a PGM or PNG image: {reason}")]
+    NotAnImage {
+        /// The plan.
+        file: String,
+        /// The picture's name as the header gives it.
+        picture: String,
+        /// What the decoder said.
+        reason: String,
+    },
+    /// The picture is larger or smaller than a building can be.
+    #[error(
+        "{file}: the picture is {width} x {height} cells, allowed is 3 to {side} a side and {cells} in all"
+    )]
+    Size {
+        /// The plan.
+        file: String,
+        /// Cells across.
+        width: u64,
+        /// Cells up.
+        height: u64,
+        /// Most cells a side.
+        side: u64,
+        /// Most cells in all.
+        cells: u64,
+    },
+    /// Nothing in the picture is free.
+    #[error("{file}: no cell of the plan is free: is `negate` right, and are the thresholds?")]
+    NoFreeCell {
+        /// The plan.
+        file: String,
+    },
+    /// The pad is not in free space.
+    #[error("the pad at ({x_m:.2}, {y_m:.2}) is {place}: it must stand in free space")]
+    PadPlace {
+        /// Plan frame.
+        x_m: f32,
+        /// Plan frame.
+        y_m: f32,
+        /// "inside a wall", "outside the plan", "in unknown space".
+        place: &'static str,
+    },
+    /// The pad is too near to a wall to take off from.
+    #[error("the pad at ({x_m:.2}, {y_m:.2}) is {clearance_m:.2} m from a wall, needed is {needed_m:.2} m")]
+    PadClearance {
+        /// Plan frame.
+        x_m: f32,
+        /// Plan frame.
+        y_m: f32,
+        /// To the nearest occupied cell, metres.
+        clearance_m: f32,
+        /// What the vehicle needs, metres.
+        needed_m: f32,
+    },
+}
+
+impl PlanError {
+    pub(crate) fn syntax(file: &str, error: &impl ToString) -> Self {
+        let text = error.to_string();
+        let reason = text.lines().next().unwrap_or("no reason given").trim().to_owned();
+        Self::Syntax { file: file.to_owned(), reason }
+    }
+
+    pub(crate) fn range(file: &str, field: &str, value: impl ToString, allowed: &str) -> Self {
+        Self::Range {
+            file: file.to_owned(),
+            field: field.to_owned(),
+            value: value.to_string(),
+            allowed: allowed.to_owned(),
+        }
+    }
+}

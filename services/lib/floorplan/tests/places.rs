@@ -1,0 +1,128 @@
+#![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
+//! Distances, rooms and sidecar files.
+
+use floorplan::{Area, Cell, DistanceField, Plan, Rooms, Sidecar};
+use proptest::prelude::*;
+
+/// Two rooms joined by a door of 0.8 m, at 0.2 m a cell.
+#[rustfmt::skip]
+const TWO: [&str; 13] = [
+    "#########################",
+    "#           #           #",
+    "#           #           #",
+    "#           #           #",
+    "#           #           #",
+    "#                       #",
+    "#                       #",
+    "#                       #",
+    "#                       #",
+    "#           #           #",
+    "#           #           #",
+    "#           #           #",
+    "#########################",
+];
+
+#[test]
+fn distance_is_zero_on_a_face_and_grows_by_one_a_metre() {
+    let plan = Plan::from_ascii(&TWO, 0.2);
+    let field = DistanceField::new(&plan, 5.0);
+    assert!(field.distance(0.2, 0.6).abs() < 1e-5, "on the left wall's face");
+    assert!((field.distance(0.5, 1.3) - 0.3).abs() < 1e-5);
+    assert_eq!(field.distance(0.05, 0.6), 0.0, "inside the wall");
+    let (gx, gy) = field.gradient(0.6, 1.3);
+    assert!((gx - 1.0).abs() < 1e-4 && gy.abs() < 1e-4);
+    assert_eq!(field.distance(f32::NAN, 1.0), 0.0);
+    assert!(DistanceField::new(&plan, 0.25).distance(1.3, 1.3) <= 0.25);
+    let none = DistanceField::new(&Plan::from_ascii(&["  ", "  "], 0.5), 3.0);
+    assert_eq!(none.distance(0.5, 0.5), 3.0, "nothing to be near to");
+}
+
+proptest! {
+    #[test]
+    fn distance_agrees_with_looking_at_every_cell(drawn in proptest::collection::vec(0_u8..8, 12 * 9)) {
+        let rows: Vec<String> =
+            drawn.chunks(12).map(|row| row.iter().map(|v| if *v == 0 { '#' } else { ' ' }).collect()).collect();
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        let plan = Plan::from_ascii(&rows, 0.1);
+        let field = DistanceField::new(&plan, 100.0);
+        for iy in 0..plan.height() {
+            for ix in 0..plan.width() {
+                let nearest = (0..plan.cells().len())
+                    .filter(|k| plan.cells()[*k] == Cell::Occupied)
+                    .map(|k| (ix as f32 - (k % 12) as f32).hypot(iy as f32 - (k / 12) as f32))
+                    .min_by(f32::total_cmp);
+                let expected = nearest.map_or(100.0, |cells| ((cells - 0.5) * 0.1).max(0.0));
+                prop_assert!((field.at_cell(ix, iy) - expected).abs() < 1e-4);
+            }
+        }
+    }
+}
+
+#[test]
+fn rooms_are_found_by_their_narrow_doors_and_numbered() {
+    let plan = Plan::from_ascii(&TWO, 0.2);
+    let rooms = Rooms::segment(&plan);
+    assert_eq!(rooms.names, ["Room 1", "Room 2"]);
+    assert_eq!(rooms.room_at(0.5, 2.2), Some(0));
+    assert_eq!(rooms.room_at(4.5, 0.5), Some(1));
+    assert_eq!(rooms.room_at(2.5, 2.2), None, "the wall between them");
+    assert!(rooms.room_at(2.5, 1.3).is_some(), "the doorway belongs to one of them");
+    assert_eq!(rooms.room_at(-3.0, 1.0), None);
+    let free = (0..plan.height()).flat_map(|iy| (0..plan.width()).map(move |ix| (ix, iy)));
+    for (ix, iy) in free.filter(|(ix, iy)| plan.cell(*ix, *iy) == Cell::Free) {
+        assert!(rooms.room_of(ix, iy).is_some(), "({ix}, {iy}) belongs to a room");
+    }
+    let narrow = Rooms::segment(&Plan::from_ascii(&["######", "#    #", "######"], 0.2));
+    assert_eq!(narrow.names, ["Room 1"], "too narrow for a core is a room all the same");
+    assert!(Rooms::segment(&Plan::from_ascii(&["##", "##"], 0.2)).is_empty());
+}
+
+const SIDECAR: &str = "pad: {x: 1.0, y: 1.2, heading_deg: 90}
+doors:
+  - {name: Door, a: [2.5, 0.8], b: [2.5, 1.6]}
+rooms:
+  - {name: Hall, rectangle: [2.5, 2.6, 0, 0]}
+  - name: Triangle
+    polygon: [[2.6, 0.2], [4.8, 0.2], [4.8, 2.4]]
+";
+
+#[test]
+fn a_sidecar_names_the_rooms_the_doors_and_the_pad() {
+    let plan = Plan::from_ascii(&TWO, 0.2);
+    let sidecar = Sidecar::parse("a.rooms.yaml", SIDECAR.as_bytes()).unwrap();
+    let pad = sidecar.pad.unwrap();
+    assert_eq!((pad.x, pad.y), (1.0, 1.2));
+    assert!((pad.heading_rad() - std::f32::consts::FRAC_PI_2).abs() < 1e-6);
+    let door = &sidecar.doors[0];
+    assert!((door.width() - 0.8).abs() < 1e-5 && (door.distance(3.0, 1.2) - 0.5).abs() < 1e-5);
+    assert_eq!(door.middle(), (2.5, 1.2));
+    assert!(matches!(sidecar.rooms[1].area, Area::Polygon(_)));
+    let rooms = Rooms::of("a.rooms.yaml", &sidecar, &plan).unwrap();
+    assert_eq!(rooms.room_at(1.0, 1.0).map(|room| rooms.name(room)), Some("Hall"));
+    assert_eq!(rooms.room_at(4.5, 0.5).map(|room| rooms.name(room)), Some("Triangle"));
+    assert_eq!(rooms.room_at(3.0, 2.3), None, "above the triangle");
+    assert_eq!(Rooms::parse("a", b"{}", &plan).unwrap().names.len(), 2, "without names they are found");
+}
+
+#[test]
+fn a_wrong_sidecar_is_refused_in_one_sentence() {
+    let cases = [
+        ("heading_deg: 90", "heading: 90", "cannot be read"),
+        ("x: 1.0", "x: .nan", "`pad.x` is NaN"),
+        ("heading_deg: 90", "heading_deg: 720", "allowed is -360 to 360 degrees"),
+        ("b: [2.5, 1.6]", "b: [2.5, 0.8]", "`doors: Door` is 0.00 m wide"),
+        ("name: Hall", "name: Triangle", "used twice"),
+        ("name: Hall", "name: \"\"", "1 to 31 bytes of text"),
+        ("[2.6, 0.2], [4.8, 0.2], [4.8, 2.4]", "[2.6, 0.2]", "`rooms: Triangle` is 1 corners"),
+        ("[2.5, 2.6, 0, 0]", "[2.5, 2.6, 0]", "cannot be read"),
+        ("[2.5, 2.6, 0, 0]", "[70, 70, 80, 80]", "without a free cell of the plan"),
+    ];
+    let plan = Plan::from_ascii(&TWO, 0.2);
+    for (from, to, expected) in cases {
+        let text = Rooms::parse("a.rooms.yaml", SIDECAR.replace(from, to).as_bytes(), &plan)
+            .unwrap_err()
+            .to_string();
+        assert!(text.starts_with("a.rooms.yaml: ") && text.contains(expected), "{to}: {text}");
+        assert_eq!(text.lines().count(), 1, "{text}");
+    }
+}

@@ -1,0 +1,108 @@
+//! One update of the particle set: motion with flow, eight ranges, weights, estimate.
+//!
+//! The target is 10 000 particles in 1 ms on one core. The table is warm: a place is asked about for the
+//! first time once in a building's life.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use floorplan::{ConeModel, ConeTable, Plan, PlanHeader};
+use mcl::{
+    Config, Echo, Filter, Flow, Generator, Motion, ParticlesMut, ParticlesRef, Reading, Start, Sweep,
+};
+use std::f32::consts::FRAC_PI_4;
+use std::hint::black_box;
+use std::path::Path;
+use std::sync::Arc;
+
+/// The plan named by `SERENO_BENCH_PLAN` (a map_server header) with a place `SERENO_BENCH_AT` (`x,y`), or
+/// a drawn hall with pillars.
+fn plan() -> (String, Plan, (f32, f32)) {
+    let named = std::env::var("SERENO_BENCH_PLAN").ok().and_then(|file| {
+        let header = PlanHeader::parse(&file, &std::fs::read(&file).ok()?).ok()?;
+        let image = std::fs::read(Path::new(&file).parent()?.join(&header.image)).ok()?;
+        let plan = Plan::load(&file, &header, &image).ok()?;
+        let at = std::env::var("SERENO_BENCH_AT").ok()?;
+        let (x, y) = at.split_once(',')?;
+        Some((file, plan, (x.parse().ok()?, y.parse().ok()?)))
+    });
+    named.unwrap_or_else(|| {
+        let rows: Vec<String> = (0..200)
+            .map(|iy| {
+                let solid = |ix: usize| {
+                    ix % 199 == 0 || iy % 199 == 0 || (ix % 50 / 6 == 4 && iy % 50 / 6 == 4)
+                };
+                (0..200).map(|ix| if solid(ix) { '#' } else { ' ' }).collect()
+            })
+            .collect();
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        ("drawn".into(), Plan::from_ascii(&rows, 0.05), (5.0, 5.6))
+    })
+}
+
+struct Columns([Vec<f32>; 8]);
+
+impl Columns {
+    fn read(&self) -> ParticlesRef<'_> {
+        let [x, y, velocity_x, velocity_y, heading_offset, level_roll, level_pitch, weight] = &self.0;
+        ParticlesRef { x, y, velocity_x, velocity_y, heading_offset, level_roll, level_pitch, weight }
+    }
+    fn write(&mut self) -> ParticlesMut<'_> {
+        let [x, y, velocity_x, velocity_y, heading_offset, level_roll, level_pitch, weight] = &mut self.0;
+        ParticlesMut { x, y, velocity_x, velocity_y, heading_offset, level_roll, level_pitch, weight }
+    }
+}
+
+fn update(c: &mut Criterion) {
+    let (name, plan, (x, y)) = plan();
+    let table = Arc::new(ConeTable::new(Arc::new(plan), ConeModel::default()));
+    let mut group = c.benchmark_group(format!("update, 8 ranges, {name}"));
+    for count in [500, 2_000, 10_000, 50_000] {
+        let mut config = Config::default();
+        config.population.min = count;
+        config.population.max = count;
+        let Ok(mut filter) = Filter::new(config, Arc::clone(&table), count) else { return };
+        let mut generator = Generator::new(1);
+        let columns = || Columns(std::array::from_fn(|_| vec![0.0; count]));
+        let (mut old, mut new) = (columns(), columns());
+        let start = Start {
+            x,
+            y,
+            sigma: 0.1,
+            heading_offset: 0.3,
+            heading_sigma: 0.1,
+            level_roll: 0.0,
+            level_pitch: 0.0,
+            level_sigma: 0.01,
+            p_lost: 0.0,
+        };
+        let mut memory = filter.start_at(&start, old.write(), &mut generator).memory;
+        let readings: Vec<Reading> = (0..8)
+            .map(|k| {
+                let bearing_rad = k as f32 * FRAC_PI_4;
+                let (sin, cos) = bearing_rad.sin_cos();
+                let range = table.range(x + 0.2 * cos, y + 0.2 * sin, bearing_rad + 0.3);
+                let echo = if range.is_finite() { Echo::Range(range) } else { Echo::Nothing };
+                Reading { echo, bearing_rad, elevation_rad: 0.0, mount_x: 0.2 * cos, mount_y: 0.2 * sin }
+            })
+            .collect();
+        let sweep = Sweep { readings: &readings, roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0 };
+        let motion = Motion {
+            dt_s: 0.06,
+            flow: Some(Flow { velocity_x: 0.0, velocity_y: 0.0, sigma: 0.08 }),
+            ..Motion::default()
+        };
+        group.throughput(Throughput::Elements(count as u64));
+        group.bench_function(BenchmarkId::from_parameter(count), |b| {
+            b.iter(|| {
+                let out =
+                    filter.update(old.read(), &memory, &motion, Some(black_box(&sweep)), new.write(), &mut generator);
+                memory = out.memory;
+                std::mem::swap(&mut old, &mut new);
+                out.estimate.x
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, update);
+criterion_main!(benches);

@@ -1,0 +1,377 @@
+//! How sonar readings weigh particles (equation 3, as one part of a mixture).
+
+use crate::SonarConfig;
+use crate::filter::BLOCK;
+use crate::map::RangeMap;
+use crate::maths::{exp_minus, power, sin_cos};
+use core::f32::consts::TAU;
+
+/// Most readings weighed at once; more are ignored.
+pub const MAX_READINGS: usize = 16;
+/// Likelihoods are kept by expected range in steps of 1/448 of the reach (9 mm at 4 m), a sixth of
+/// sigma: the cone table is coarser.
+const STEPS: usize = 448;
+/// Entries beyond the steps all mean "no echo expected"; a power of two, for the mask below.
+const ENTRIES: usize = 512;
+/// 2²³: adding it leaves the rounded value in the low bits of an `f32` (0..=2²²).
+const ROUND: f32 = 8_388_608.0;
+/// Where the plan promises a surface nearer than this, metres, the exponential of unmapped things is not
+/// squeezed into less room.
+const NEAREST: f32 = 0.05;
+
+/// What came back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Echo {
+    /// The nearest echo, metres from the sensor's face.
+    Range(f32),
+    /// The sensor worked and heard nothing.
+    Nothing,
+}
+
+/// One reading and the sensor's mount in the body frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// What came back.
+    pub echo: Echo,
+    /// Azimuth of the axis, counter-clockwise from forward, radians.
+    pub bearing_rad: f32,
+    /// Elevation of the axis, up positive, radians.
+    pub elevation_rad: f32,
+    /// Position of the face, forward, metres.
+    pub mount_x: f32,
+    /// Position of the face, left, metres.
+    pub mount_y: f32,
+}
+
+/// Readings of sensors that were fired together, and the attitude then.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweep<'a> {
+    /// At most [`MAX_READINGS`] are used.
+    pub readings: &'a [Reading],
+    /// Right side down positive.
+    pub roll_rad: f32,
+    /// Nose down positive.
+    pub pitch_rad: f32,
+    /// Compass frame.
+    pub yaw_rad: f32,
+}
+
+/// The mixture from which a reading is thought to come. For a place from which the plan promises an echo
+/// at `r`: the wall itself (equation 3 around `r`), something unmapped before it (exponential, cut at
+/// `r`), nothing at all, or anything.
+#[derive(Clone, Debug)]
+pub struct SonarModel {
+    config: SonarConfig,
+}
+
+impl SonarModel {
+    /// A model with these settings (checked by [`crate::Config::check`]).
+    #[must_use]
+    pub fn new(config: &SonarConfig) -> Self {
+        Self { config: config.clone() }
+    }
+
+    /// Probability that a promised surface is what answers.
+    fn hit(&self) -> f32 {
+        let c = &self.config;
+        1.0 - c.short - c.missed - c.random
+    }
+
+    /// Standard deviation of a hit at range `r`, metres.
+    #[must_use]
+    pub fn sigma(&self, r: f32) -> f32 {
+        self.config.sigma.hypot(self.config.sigma_per_m * r)
+    }
+
+    /// Likelihood of `echo` where the plan promises `expected` metres (infinite: no echo): a density per
+    /// metre for a range, a probability for no echo.
+    #[must_use]
+    pub fn likelihood(&self, echo: Echo, expected: f32) -> f32 {
+        let c = &self.config;
+        let reach = c.max_range;
+        let promised = expected <= reach;
+        match (echo, promised) {
+            (Echo::Nothing, false) => 1.0 - c.unexpected,
+            (Echo::Range(_), false) => c.unexpected / reach,
+            (Echo::Nothing, true) => {
+                // An echo grows weak towards the end of the reach.
+                let far = ((expected / reach - 0.85) / 0.15).clamp(0.0, 1.0);
+                c.missed + far * 0.5 * (1.0 - c.missed)
+            }
+            (Echo::Range(z), true) => {
+                let sigma = self.sigma(expected);
+                let error = (z - expected) / sigma;
+                let gauss = (-0.5 * error * error).exp() / (sigma * TAU.sqrt());
+                // Unmapped things stand as near as 1 m on average; the exponential is cut at the wall.
+                let before = if z < expected { (-z).exp() / (1.0 - (-expected.max(NEAREST)).exp()) } else { 0.0 };
+                self.hit() * gauss + c.short * before + c.random / reach
+            }
+        }
+    }
+
+    /// Likelihood of `echo` to one who has no idea where on the plan it was made.
+    pub(crate) fn blind_likelihood(&self, echo: Echo) -> f32 {
+        // Half of all rays end within the nearer 40 % of the reach, one in four hears nothing: typical of
+        // rooms and corridors, and only the order of magnitude matters.
+        match echo {
+            Echo::Nothing => 0.25,
+            Echo::Range(z) => 0.75 * (-z / (0.6 * self.config.max_range)).exp() / (0.487 * self.config.max_range),
+        }
+    }
+
+    /// Elevation of a sensor's axis against the horizon in a tilted body.
+    fn elevation(reading: &Reading, sweep: &Sweep<'_>) -> f32 {
+        let (sin, cos) = reading.bearing_rad.sin_cos();
+        reading.elevation_rad - sweep.pitch_rad * cos + sweep.roll_rad * sin
+    }
+
+    /// The reading as it would be with the axis level; `None` when it says nothing about walls: the
+    /// sensor looks up or down, or the numbers make no sense.
+    pub(crate) fn levelled(&self, reading: &Reading, sweep: &Sweep<'_>) -> Option<Echo> {
+        let elevation = Self::elevation(reading, sweep);
+        let usable = elevation.abs() <= self.config.max_elevation
+            && reading.bearing_rad.is_finite()
+            && reading.mount_x.abs() < 2.0
+            && reading.mount_y.abs() < 2.0;
+        match reading.echo {
+            _ if !usable => None,
+            Echo::Nothing => Some(Echo::Nothing),
+            Echo::Range(z) if z > 0.0 && z <= self.config.max_range => Some(Echo::Range(z * elevation.cos())),
+            Echo::Range(z) if z > self.config.max_range => Some(Echo::Nothing),
+            Echo::Range(_) => None,
+        }
+    }
+}
+
+/// What of the mixture depends on the expected range alone, by row.
+struct Row {
+    expected: f32,
+    /// 1 / 2σ².
+    precision: f32,
+    /// Hit probability over σ√(2π).
+    hit: f32,
+    /// Weight of the exponential before the wall.
+    before: f32,
+}
+
+/// One reading made ready to weigh particles.
+struct Beam {
+    bearing: f32,
+    mount_x: f32,
+    mount_y: f32,
+    /// Likelihood to one who does not know the place.
+    blind: f32,
+    /// Likelihood at the best place; the factors are in its proportion.
+    best: f32,
+    /// Sum over the set of prior weight times factor.
+    evidence: f32,
+    /// By expected range: likelihood over `best`, at least the floor.
+    factor: [f32; ENTRIES],
+}
+
+/// The readings of one update made ready; kept in the filter, so that an update allocates nothing.
+pub(crate) struct Beams {
+    model: SonarModel,
+    rows: Vec<Row>,
+    beams: Vec<Beam>,
+    used: usize,
+    scale: f32,
+    yaw: f32,
+}
+
+impl Beams {
+    pub(crate) fn new(config: &SonarConfig) -> Self {
+        let model = SonarModel::new(config);
+        let step = config.max_range / STEPS as f32;
+        let rows = (0..=STEPS)
+            .map(|i| {
+                let expected = i as f32 * step;
+                let sigma = model.sigma(expected);
+                Row {
+                    expected,
+                    precision: 0.5 / (sigma * sigma),
+                    hit: model.hit() / (sigma * TAU.sqrt()),
+                    before: config.short / (1.0 - (-expected.max(NEAREST)).exp()),
+                }
+            })
+            .collect();
+        let beam = || Beam {
+            bearing: 0.0,
+            mount_x: 0.0,
+            mount_y: 0.0,
+            blind: 1.0,
+            best: 1.0,
+            evidence: 0.0,
+            factor: [1.0; ENTRIES],
+        };
+        Self {
+            model,
+            rows,
+            beams: (0..MAX_READINGS).map(|_| beam()).collect(),
+            used: 0,
+            scale: STEPS as f32 / config.max_range,
+            yaw: 0.0,
+        }
+    }
+
+    pub(crate) fn model(&self) -> &SonarModel {
+        &self.model
+    }
+
+    /// Fills one look-up table a reading.
+    pub(crate) fn prepare(&mut self, sweep: &Sweep<'_>) {
+        self.used = 0;
+        self.yaw = sweep.yaw_rad;
+        if !sweep.yaw_rad.is_finite() {
+            return;
+        }
+        let model = &self.model;
+        for reading in sweep.readings.iter().take(MAX_READINGS) {
+            let Some(echo) = model.levelled(reading, sweep) else { continue };
+            let beam = &mut self.beams[self.used];
+            beam.bearing = reading.bearing_rad;
+            beam.mount_x = reading.mount_x;
+            beam.mount_y = reading.mount_y;
+            beam.blind = model.blind_likelihood(echo);
+            beam.evidence = 0.0;
+            match echo {
+                Echo::Range(z) => {
+                    let random = model.config.random / model.config.max_range;
+                    let near = (-z).exp();
+                    for (factor, row) in beam.factor.iter_mut().zip(&self.rows) {
+                        let error = z - row.expected;
+                        let before = if error < 0.0 { row.before * near } else { 0.0 };
+                        *factor = row.hit * exp_minus(error * error * row.precision) + before + random;
+                    }
+                }
+                Echo::Nothing => {
+                    for (factor, row) in beam.factor.iter_mut().zip(&self.rows) {
+                        *factor = model.likelihood(echo, row.expected);
+                    }
+                }
+            }
+            beam.factor[STEPS + 1..].fill(model.likelihood(echo, f32::INFINITY));
+            beam.best = beam.factor.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+            let (scale, floor) = (1.0 / beam.best, model.config.floor);
+            for factor in &mut beam.factor {
+                *factor = (*factor * scale).max(floor);
+            }
+            self.used += 1;
+        }
+    }
+
+    /// Multiplies the weights of a block of particles by the tempered likelihood of the readings.
+    pub(crate) fn weigh<M: RangeMap>(
+        &mut self,
+        map: &M,
+        x: &[f32],
+        y: &[f32],
+        heading_offset: &[f32],
+        weight: &mut [f32],
+    ) {
+        if self.used == 0 {
+            return;
+        }
+        let n = x.len().min(BLOCK);
+        let (x, y, offset, weight) = (&x[..n], &y[..n], &heading_offset[..n], &mut weight[..n]);
+        let (mut sin, mut cos) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+        for i in 0..n {
+            (sin[i], cos[i]) = sin_cos(self.yaw + offset[i]);
+        }
+        let mut product = [1.0f32; BLOCK];
+        for beam in &mut self.beams[..self.used] {
+            let axis = self.yaw + beam.bearing;
+            let mut evidence = 0.0;
+            for i in 0..n {
+                let sensor_x = x[i] + cos[i] * beam.mount_x - sin[i] * beam.mount_y;
+                let sensor_y = y[i] + sin[i] * beam.mount_x + cos[i] * beam.mount_y;
+                let expected = map.range(sensor_x, sensor_y, axis + offset[i]);
+                let factor = beam.factor[entry(expected * self.scale)];
+                product[i] *= factor;
+                evidence += weight[i] * factor;
+            }
+            beam.evidence += evidence;
+        }
+        let temper = self.model.config.temper;
+        for i in 0..n {
+            weight[i] *= power(product[i], temper);
+        }
+    }
+
+    /// Of each reading: its likelihood under the set before it was weighed (prior weights summing to
+    /// `total`), and to one who does not know the place.
+    pub(crate) fn evidence(&self, total: f32) -> impl Iterator<Item = (f32, f32)> + '_ {
+        self.beams[..self.used].iter().map(move |b| (b.best * b.evidence / total, b.blind))
+    }
+}
+
+/// Row of the table for a range in steps: rounded, everything past the steps (infinite and NaN too) in
+/// the last row. Adding 2²³ instead of a cast, because a cast that saturates costs more than the rest.
+#[inline]
+fn entry(steps: f32) -> usize {
+    ((steps.min((ENTRIES - 1) as f32) + ROUND).to_bits() & (ENTRIES as u32 - 1)) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Echo, Reading, STEPS, SonarModel, Sweep, entry};
+    use crate::SonarConfig;
+
+    fn model() -> SonarModel {
+        SonarModel::new(&SonarConfig::default())
+    }
+
+    #[test]
+    fn a_range_falls_into_its_row() {
+        assert_eq!(entry(0.0), 0);
+        assert_eq!(entry(17.4), 17);
+        assert_eq!(entry(STEPS as f32), STEPS);
+        for beyond in [512.0, 1e9, f32::INFINITY, f32::NAN] {
+            assert_eq!(entry(beyond), 511, "{beyond}");
+        }
+    }
+
+    /// Over all ranges and no echo, the mixture is a probability (to the cut of the Gaussian's tails).
+    #[test]
+    fn the_mixture_sums_to_one() {
+        for expected in [0.5, 1.3, 2.0, 3.0, f32::INFINITY] {
+            let step = 0.001;
+            let ranges: f32 =
+                (0..4000).map(|i| model().likelihood(Echo::Range((i as f32 + 0.5) * step), expected) * step).sum();
+            let sum = ranges + model().likelihood(Echo::Nothing, expected);
+            assert!((sum - 1.0).abs() < 0.02, "{expected}: {sum}");
+        }
+    }
+
+    #[test]
+    fn a_short_reading_is_forgiven_a_long_one_is_not() {
+        let m = model();
+        let short = m.likelihood(Echo::Range(1.0), 2.0);
+        let long = m.likelihood(Echo::Range(2.0), 1.0);
+        assert!(short > 1.8 * long, "an unmapped chair is likelier than a hole in a wall: {short} {long}");
+        assert!(m.likelihood(Echo::Range(2.0), 2.0) > 40.0 * short);
+    }
+
+    #[test]
+    fn sensors_that_look_away_from_the_walls_say_nothing() {
+        let reading = Reading {
+            echo: Echo::Range(1.0),
+            bearing_rad: 0.0,
+            elevation_rad: 0.0,
+            mount_x: 0.2,
+            mount_y: 0.0,
+        };
+        let level = Sweep { readings: &[], roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0 };
+        let m = model();
+        assert_eq!(m.levelled(&reading, &level), Some(Echo::Range(1.0)));
+        let down = Reading { elevation_rad: -1.57, ..reading };
+        assert_eq!(m.levelled(&down, &level), None);
+        assert_eq!(m.levelled(&reading, &Sweep { pitch_rad: 0.6, ..level }), None, "nose in the floor");
+        assert!(m.levelled(&reading, &Sweep { roll_rad: 0.6, ..level }).is_some(), "roll turns about it");
+        for echo in [f32::NAN, -1.0, 0.0] {
+            assert_eq!(m.levelled(&Reading { echo: Echo::Range(echo), ..reading }, &level), None);
+        }
+        let far = Reading { echo: Echo::Range(9.0), ..reading };
+        assert_eq!(m.levelled(&far, &level), Some(Echo::Nothing), "beyond the reach");
+    }
+}

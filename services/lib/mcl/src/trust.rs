@@ -1,0 +1,77 @@
+//! Whether the set still fits what is heard.
+
+use crate::config::{ConfigError, within};
+
+/// How doubt grows and fades.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrustConfig {
+    /// Exponent on each reading's evidence: readings of one second resemble each other.
+    pub temper: f32,
+    /// Most that one reading can change the log odds.
+    pub cap: f32,
+    /// Chance of getting lost unnoticed, per second: keeps doubt from falling to nothing.
+    pub hazard_per_s: f32,
+    /// Chance of having come right again, per second: keeps doubt from becoming certainty.
+    pub recovery_per_s: f32,
+}
+
+impl Default for TrustConfig {
+    fn default() -> Self {
+        Self { temper: 0.25, cap: 0.4, hazard_per_s: 0.002, recovery_per_s: 0.01 }
+    }
+}
+
+impl TrustConfig {
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        within("trust.temper", self.temper, 0.01..=1.0)?;
+        within("trust.cap", self.cap, 0.01..=5.0)?;
+        within("trust.hazard_per_s", self.hazard_per_s, 1e-6..=0.5)?;
+        within("trust.recovery_per_s", self.recovery_per_s, 1e-6..=0.5)
+    }
+
+    /// P(lost) after `dt` seconds and readings with the given (likelihood by the set, likelihood to one
+    /// who does not know the place): a two-state hidden Markov chain. Where the readings fit the set
+    /// better than they fit any place, doubt falls; unmapped things raise it by a bounded amount each.
+    pub(crate) fn step(&self, p_lost: f32, dt: f32, evidence: impl Iterator<Item = (f32, f32)>) -> f32 {
+        let p = if (0.0..=1.0).contains(&p_lost) { p_lost } else { 0.5 };
+        let dt = dt.clamp(0.0, 5.0);
+        let p = p + (1.0 - p) * (self.hazard_per_s * dt).min(0.5) - p * (self.recovery_per_s * dt).min(0.5);
+        let p = p.clamp(1e-6, 1.0 - 1e-6);
+        let mut odds = (p / (1.0 - p)).ln();
+        for (by_set, blind) in evidence {
+            let ratio = (blind.max(1e-6) / by_set.max(1e-6)).ln() * self.temper;
+            // NaN (a broken set) counts as the worst reading.
+            odds += if ratio.is_nan() { self.cap } else { ratio.clamp(-self.cap, self.cap) };
+        }
+        1.0 / (1.0 + (-odds).exp())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::TrustConfig;
+
+    /// One pair of readings each 60 ms, as (by the set, blind).
+    fn after(seconds: f32, pair: [(f32, f32); 2]) -> f32 {
+        let t = TrustConfig::default();
+        (0..(seconds / 0.06) as usize).fold(0.01, |p, _| t.step(p, 0.06, pair.into_iter()))
+    }
+
+    const HIT: (f32, f32) = (4.0, 0.3);
+    const WRONG: (f32, f32) = (0.05, 0.3);
+
+    #[test]
+    fn doubt_follows_the_readings() {
+        assert!(after(10.0, [HIT, HIT]) < 0.005);
+        assert!(after(10.0, [HIT, WRONG]) < 0.05, "half of the readings hit unmapped things");
+        assert!(after(3.0, [WRONG, WRONG]) > 0.9, "nothing fits for three seconds");
+        assert!(after(0.3, [WRONG, WRONG]) < 0.5, "a third of a second is a person passing");
+    }
+
+    #[test]
+    fn broken_evidence_is_doubt() {
+        let t = TrustConfig::default();
+        assert!(t.step(0.1, 0.06, [(f32::NAN, 0.3)].into_iter()) > 0.1);
+        assert!((0.0..=1.0).contains(&t.step(f32::NAN, f32::NAN, [HIT].into_iter())));
+    }
+}

@@ -1,0 +1,275 @@
+//! The lockstep bus: queues in one process, on a simulated clock.
+
+use crate::device::{ByteDevice, MemoryDevice};
+use crate::mix_seed;
+use crate::port::Limits;
+use ipc_types::Message;
+use std::any::Any;
+use std::cell::{Cell, RefCell};
+use std::collections::{HashMap, VecDeque};
+use std::rc::Rc;
+
+/// Wake-up delay of a message, nanoseconds: what a loaded two-core machine shows (FACTS 6: 8 us for an
+/// event, up to 7 ms of scheduling latency under load).
+const DELAY_LEAST_NS: u64 = 50_000;
+const DELAY_SPREAD_NS: u64 = 950_000;
+/// One message in this many is late by up to `DELAY_LATE_NS`.
+const LATE_ONE_IN: u64 = 100;
+const DELAY_LATE_NS: u64 = 6_000_000;
+
+/// One message waiting in one input.
+struct Waiting<T> {
+    visible_ns: u64,
+    slot: Rc<T>,
+}
+
+struct Queue<T> {
+    waiting: RefCell<VecDeque<Waiting<T>>>,
+    depth: usize,
+    /// The service that reads, and whether it is to be woken.
+    wakes: Option<String>,
+    closed: Cell<bool>,
+}
+
+struct Topic<T> {
+    pool: RefCell<Vec<Rc<T>>>,
+    pool_size: Cell<usize>,
+    readers: RefCell<Vec<Rc<Queue<T>>>>,
+    /// The newest message of a live publisher: what a late joiner gets.
+    newest: RefCell<Option<Rc<T>>>,
+    /// The newest message of any publisher, dead ones included: what the keeper holds.
+    kept: RefCell<Option<Rc<T>>>,
+}
+
+/// What the scheduler needs to know of a topic without knowing its type.
+trait AnyTopic {
+    /// When the next message becomes visible that wakes `service`, if any is still waiting after `now`.
+    fn next_wake(&self, service: &str, now: u64) -> u64;
+    /// Fills the pool so that no later loan allocates.
+    fn fill_pool(&self);
+    fn publisher_died(&self);
+    fn forget_closed_readers(&self);
+    fn as_any(self: Rc<Self>) -> Rc<dyn Any>;
+}
+
+impl<T: Message> AnyTopic for Topic<T> {
+    fn next_wake(&self, service: &str, now: u64) -> u64 {
+        let readers = self.readers.borrow();
+        let mut next = u64::MAX;
+        for queue in readers.iter().filter(|queue| queue.wakes.as_deref() == Some(service)) {
+            for waiting in queue.waiting.borrow().iter() {
+                if waiting.visible_ns > now {
+                    next = next.min(waiting.visible_ns);
+                    break;
+                }
+            }
+        }
+        next
+    }
+
+    fn fill_pool(&self) {
+        let limits = Limits::of::<T>();
+        let readers = self.readers.borrow();
+        let wanted: usize =
+            4 + readers.iter().map(|queue| queue.depth + limits.held.min(2)).sum::<usize>();
+        self.pool_size.set(wanted);
+        let mut pool = self.pool.borrow_mut();
+        pool.reserve(wanted);
+        while pool.len() < wanted {
+            pool.push(bytemuck::allocation::zeroed_rc());
+        }
+    }
+
+    fn publisher_died(&self) {
+        *self.newest.borrow_mut() = None;
+    }
+
+    fn forget_closed_readers(&self) {
+        self.readers.borrow_mut().retain(|queue| !queue.closed.get());
+    }
+
+    fn as_any(self: Rc<Self>) -> Rc<dyn Any> {
+        self
+    }
+}
+
+/// Ends of wires that wait for their other end.
+type Wires = RefCell<HashMap<String, MemoryDevice>>;
+
+pub(crate) struct Bus {
+    topics: RefCell<Vec<(String, Rc<dyn AnyTopic>)>>,
+    wires: Wires,
+    seed: u64,
+    drawn: Cell<u64>,
+    now: Cell<u64>,
+}
+
+impl Bus {
+    pub(crate) fn new(seed: u64) -> Rc<Self> {
+        Rc::new(Self {
+            topics: RefCell::default(),
+            wires: RefCell::default(),
+            seed,
+            drawn: Cell::new(0),
+            now: Cell::new(0),
+        })
+    }
+
+    pub(crate) fn set_now(&self, now: u64) {
+        self.now.set(now);
+    }
+
+    /// A seeded delay: most messages are quick, a few are late.
+    pub(crate) fn delay_ns(&self) -> u64 {
+        let count = self.drawn.get();
+        self.drawn.set(count + 1);
+        let draw = mix_seed(self.seed, count);
+        let late = if draw.is_multiple_of(LATE_ONE_IN) { (draw >> 40) * DELAY_LATE_NS >> 24 } else { 0 };
+        DELAY_LEAST_NS + ((draw >> 32) * DELAY_SPREAD_NS >> 32) + late
+    }
+
+    fn topic<T: Message>(&self, name: &str) -> Rc<Topic<T>> {
+        let mut topics = self.topics.borrow_mut();
+        for (known, topic) in topics.iter() {
+            if known == name
+                && let Ok(found) = Rc::clone(topic).as_any().downcast::<Topic<T>>()
+            {
+                return found;
+            }
+        }
+        let topic = Rc::new(Topic::<T> {
+            pool: RefCell::default(),
+            pool_size: Cell::new(0),
+            readers: RefCell::default(),
+            newest: RefCell::new(None),
+            kept: RefCell::new(None),
+        });
+        topics.push((name.to_owned(), Rc::clone(&topic) as Rc<dyn AnyTopic>));
+        topic
+    }
+
+    pub(crate) fn input<T: Message>(
+        self: &Rc<Self>,
+        name: &str,
+        depth: usize,
+        service: &str,
+        wake: bool,
+    ) -> LockstepInput<T> {
+        let topic = self.topic::<T>(name);
+        let queue = Rc::new(Queue {
+            waiting: RefCell::new(VecDeque::with_capacity(depth + 1)),
+            depth,
+            wakes: wake.then(|| service.to_owned()),
+            closed: Cell::new(false),
+        });
+        if let Some(newest) = topic.newest.borrow().as_ref() {
+            let visible_ns = self.now.get() + self.delay_ns();
+            queue.waiting.borrow_mut().push_back(Waiting { visible_ns, slot: Rc::clone(newest) });
+        }
+        topic.readers.borrow_mut().push(Rc::clone(&queue));
+        topic.fill_pool();
+        LockstepInput { queue, bus: Rc::clone(self) }
+    }
+
+    pub(crate) fn output<T: Message>(self: &Rc<Self>, name: &str) -> LockstepOutput<T> {
+        let topic = self.topic::<T>(name);
+        topic.fill_pool();
+        LockstepOutput { topic, bus: Rc::clone(self) }
+    }
+
+    /// The two services that ask for the same device are wired to each other.
+    pub(crate) fn device(&self, name: &str) -> Box<dyn ByteDevice> {
+        let mut wires = self.wires.borrow_mut();
+        if let Some(end) = wires.remove(name) {
+            return Box::new(end);
+        }
+        let (mine, other) = MemoryDevice::pair();
+        wires.insert(name.to_owned(), other);
+        Box::new(mine)
+    }
+
+    pub(crate) fn retained<T: Message>(&self) -> Option<Box<T>> {
+        let topic = self.topic::<T>(T::TOPIC);
+        let kept = topic.kept.borrow();
+        kept.as_ref().map(|slot| {
+            let mut copy = bytemuck::allocation::zeroed_box::<T>();
+            bytemuck::bytes_of_mut(&mut *copy).copy_from_slice(bytemuck::bytes_of(&**slot));
+            copy
+        })
+    }
+
+    pub(crate) fn next_wake(&self, service: &str, now: u64) -> u64 {
+        self.topics.borrow().iter().map(|(_, topic)| topic.next_wake(service, now)).min().unwrap_or(u64::MAX)
+    }
+
+    /// A service died: late joiners get nothing from it any more, and its queues are gone.
+    pub(crate) fn died(&self, published: impl Fn(&str) -> bool) {
+        for (name, topic) in self.topics.borrow().iter() {
+            if published(name) {
+                topic.publisher_died();
+            }
+            topic.forget_closed_readers();
+        }
+    }
+}
+
+pub(crate) struct LockstepInput<T: Message> {
+    queue: Rc<Queue<T>>,
+    bus: Rc<Bus>,
+}
+
+impl<T: Message> LockstepInput<T> {
+    pub(crate) fn receive(&mut self) -> Option<Rc<T>> {
+        let mut waiting = self.queue.waiting.borrow_mut();
+        if waiting.front()?.visible_ns > self.bus.now.get() {
+            return None;
+        }
+        waiting.pop_front().map(|first| first.slot)
+    }
+}
+
+impl<T: Message> Drop for LockstepInput<T> {
+    fn drop(&mut self) {
+        self.queue.closed.set(true);
+    }
+}
+
+pub(crate) struct LockstepOutput<T: Message> {
+    topic: Rc<Topic<T>>,
+    bus: Rc<Bus>,
+}
+
+impl<T: Message> Clone for LockstepOutput<T> {
+    fn clone(&self) -> Self {
+        Self { topic: Rc::clone(&self.topic), bus: Rc::clone(&self.bus) }
+    }
+}
+
+impl<T: Message> LockstepOutput<T> {
+    /// Takes a slot that nobody else holds out of the pool.
+    pub(crate) fn loan(&self) -> Option<Rc<T>> {
+        let mut pool = self.topic.pool.borrow_mut();
+        match pool.iter().position(|slot| Rc::strong_count(slot) == 1) {
+            Some(free) => Some(pool.swap_remove(free)),
+            // A loan that was dropped unsent took its slot along.
+            None if pool.len() < self.topic.pool_size.get() => Some(bytemuck::allocation::zeroed_rc()),
+            None => None,
+        }
+    }
+
+    pub(crate) fn send(&self, slot: Rc<T>, now: u64) {
+        for queue in self.topic.readers.borrow().iter().filter(|queue| !queue.closed.get()) {
+            let mut waiting = queue.waiting.borrow_mut();
+            // A later message is never visible before an earlier one.
+            let earliest = waiting.back().map_or(0, |last| last.visible_ns);
+            let visible_ns = (now + self.bus.delay_ns()).max(earliest);
+            if waiting.len() == queue.depth {
+                waiting.pop_front();
+            }
+            waiting.push_back(Waiting { visible_ns, slot: Rc::clone(&slot) });
+        }
+        *self.topic.newest.borrow_mut() = Some(Rc::clone(&slot));
+        *self.topic.kept.borrow_mut() = Some(Rc::clone(&slot));
+        self.topic.pool.borrow_mut().push(slot);
+    }
+}

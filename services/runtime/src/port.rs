@@ -1,0 +1,322 @@
+//! Typed ports: one API on two buses.
+//!
+//! Rules that hold on both, proved by `tests/conformance.rs`:
+//! - an [`Input`] keeps at most `depth` messages; when one more comes the oldest is dropped, and the gap
+//!   in the sequence is counted as lost when the next is taken;
+//! - an input that joins late gets the newest message of a live publisher, and nothing older;
+//! - a message that is held ([`Guard`]) stays as it is until the guard is dropped;
+//! - a [`Loan`] that is dropped unsent is not seen by anyone and uses up no sequence number;
+//! - no port allocates after start.
+
+use crate::device::{ByteDevice, Devices};
+use crate::journal::InputStats;
+use crate::lockstep::bus::{Bus, LockstepInput, LockstepOutput};
+use crate::shm::{SharedInput, SharedLoan, SharedNode, SharedOutput, SharedSample};
+use crate::{StartError, access, fnv};
+use ipc_types::{Header, Message};
+use manifest::Manifest;
+use std::cell::Cell;
+use std::ops::{Deref, DerefMut};
+use std::rc::Rc;
+
+/// Depth of inputs and number of readers of one topic: the same on both buses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Most messages that wait in one input.
+    pub depth: usize,
+    /// Most messages that one reader may hold at a time.
+    pub held: usize,
+    /// Most readers.
+    pub readers: usize,
+}
+
+impl Limits {
+    /// Messages past 64 KiB are few and far between: their queues are short, as each place is paid for.
+    #[must_use]
+    pub const fn of<T: Message>() -> Self {
+        if size_of::<T>() > 65_536 {
+            Self { depth: 2, held: 2, readers: 6 }
+        } else {
+            Self { depth: 16, held: 4, readers: 16 }
+        }
+    }
+}
+
+/// What all ports of one service share.
+#[derive(Debug)]
+pub(crate) struct StepContext {
+    pub now: Cell<u64>,
+    pub publisher: u32,
+    pub incarnation: u32,
+}
+
+impl StepContext {
+    pub(crate) fn new(service: &str, incarnation: u32) -> Rc<Self> {
+        let hash = fnv(service.as_bytes());
+        Rc::new(Self { now: Cell::new(0), publisher: (hash ^ (hash >> 32)) as u32, incarnation })
+    }
+}
+
+enum InputKind<T: Message> {
+    Shared(SharedInput<T>),
+    Lockstep(LockstepInput<T>),
+}
+
+/// Where messages of one topic arrive.
+pub struct Input<T: Message> {
+    kind: InputKind<T>,
+    stats: Rc<InputStats>,
+}
+
+impl<T: Message> Input<T> {
+    /// The oldest message not yet taken.
+    pub fn receive(&mut self) -> Option<Guard<T>> {
+        let guard = match &mut self.kind {
+            InputKind::Shared(input) => input.receive().map(|sample| Guard(GuardKind::Shared(sample))),
+            InputKind::Lockstep(input) => input.receive().map(|slot| Guard(GuardKind::Lockstep(slot))),
+        }?;
+        self.stats.taken(guard.header());
+        Some(guard)
+    }
+
+    /// Takes everything and returns the newest; `None` when nothing new has come.
+    pub fn latest(&mut self) -> Option<Guard<T>> {
+        let mut newest = None;
+        while let Some(guard) = self.receive() {
+            newest = Some(guard);
+        }
+        newest
+    }
+
+    /// Messages overwritten before they were taken.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.stats.lost()
+    }
+}
+
+enum GuardKind<T: Message> {
+    Shared(SharedSample<T>),
+    Lockstep(Rc<T>),
+}
+
+/// A received message where it lies: nothing was copied. Dropping it gives the place back.
+pub struct Guard<T: Message>(GuardKind<T>);
+
+impl<T: Message> Deref for Guard<T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        match &self.0 {
+            GuardKind::Shared(sample) => sample,
+            GuardKind::Lockstep(slot) => slot,
+        }
+    }
+}
+
+enum OutputKind<T: Message> {
+    Shared(Rc<SharedOutput<T>>),
+    Lockstep(LockstepOutput<T>),
+}
+
+/// Where messages of one topic leave.
+pub struct Output<T: Message> {
+    kind: OutputKind<T>,
+    context: Rc<StepContext>,
+    sequence: Rc<Cell<u64>>,
+    refused: u64,
+}
+
+impl<T: Message> Output<T> {
+    /// A place to write the next message in. Its content is whatever was there before: every field that
+    /// means something must be written. `None` (counted) when all places are in use.
+    pub fn loan(&mut self) -> Option<Loan<T>> {
+        let kind = match &self.kind {
+            OutputKind::Shared(output) => output.loan().map(|loan| LoanKind::Shared(Rc::clone(output), loan)),
+            OutputKind::Lockstep(output) => {
+                output.loan().map(|slot| LoanKind::Lockstep(output.clone(), slot))
+            }
+        };
+        if kind.is_none() {
+            self.refused += 1;
+        }
+        Some(Loan { kind: kind?, context: Rc::clone(&self.context), sequence: Rc::clone(&self.sequence) })
+    }
+
+    /// Sends a copy: for small messages that are assembled elsewhere. False when no place was free.
+    pub fn publish(&mut self, message: &T) -> bool {
+        match self.loan() {
+            Some(mut loan) => {
+                *loan = *message;
+                loan.send();
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// How often no place was free.
+    #[must_use]
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+}
+
+enum LoanKind<T: Message> {
+    Shared(Rc<SharedOutput<T>>, SharedLoan<T>),
+    Lockstep(LockstepOutput<T>, Rc<T>),
+}
+
+/// A message being written where it will be read.
+pub struct Loan<T: Message> {
+    kind: LoanKind<T>,
+    context: Rc<StepContext>,
+    sequence: Rc<Cell<u64>>,
+}
+
+impl<T: Message> Loan<T> {
+    /// Fills in the header and hands the message over.
+    pub fn send(mut self) {
+        let sequence = self.sequence.get() + 1;
+        self.sequence.set(sequence);
+        *self.header_mut() = Header {
+            stamp_ns: self.context.now.get(),
+            sequence,
+            publisher: self.context.publisher,
+            incarnation: self.context.incarnation,
+        };
+        match self.kind {
+            LoanKind::Shared(output, loan) => output.send(loan),
+            LoanKind::Lockstep(output, slot) => output.send(slot, self.context.now.get()),
+        }
+    }
+}
+
+impl<T: Message> Deref for Loan<T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        match &self.kind {
+            LoanKind::Shared(_, loan) => loan,
+            LoanKind::Lockstep(_, slot) => slot,
+        }
+    }
+}
+
+impl<T: Message> DerefMut for Loan<T> {
+    fn deref_mut(&mut self) -> &mut T {
+        match &mut self.kind {
+            LoanKind::Shared(_, loan) => loan,
+            // The slot was taken out of the pool, so this is its only owner and nothing is copied.
+            LoanKind::Lockstep(_, slot) => Rc::make_mut(slot),
+        }
+    }
+}
+
+pub(crate) enum BusKind {
+    Shared(Rc<SharedNode>),
+    Lockstep(Rc<Bus>),
+}
+
+/// The ports of one service, checked against the manifest as they are opened.
+pub struct Ports {
+    pub(crate) bus: BusKind,
+    pub(crate) service: String,
+    pub(crate) manifest: Rc<Manifest>,
+    pub(crate) context: Rc<StepContext>,
+    pub(crate) inputs: Vec<Rc<InputStats>>,
+    pub(crate) devices: Box<dyn Devices>,
+    /// Topics for which the keeper holds something for this start of the service.
+    pub(crate) retained: Vec<String>,
+}
+
+impl Ports {
+    fn refuse(&self, action: &'static str, topic: &str) -> StartError {
+        StartError::Port { service: self.service.clone(), action, topic: topic.to_owned() }
+    }
+
+    /// An input of the topic of `T`, `depth` messages deep (at least 1, at most [`Limits::of`]).
+    ///
+    /// # Errors
+    /// When the manifest does not list the topic for this service, or shared memory refuses.
+    pub fn input<T: Message>(&mut self, depth: usize) -> Result<Input<T>, StartError> {
+        self.input_of(T::TOPIC, depth)
+    }
+
+    /// An input of one topic of a family, such as `health/sonar`.
+    ///
+    /// # Errors
+    /// As [`Ports::input`].
+    pub fn input_of<T: Message>(&mut self, topic: &str, depth: usize) -> Result<Input<T>, StartError> {
+        let Some(wake) = access::subscription(&self.manifest, &self.service, topic) else {
+            return Err(self.refuse("subscribe", topic));
+        };
+        let depth = depth.clamp(1, Limits::of::<T>().depth);
+        let kind = match &self.bus {
+            BusKind::Shared(node) => InputKind::Shared(node.input(topic, depth)?),
+            BusKind::Lockstep(bus) => InputKind::Lockstep(bus.input(topic, depth, &self.service, wake)),
+        };
+        let stats = Rc::new(InputStats::default());
+        self.inputs.push(Rc::clone(&stats));
+        Ok(Input { kind, stats })
+    }
+
+    /// The output of the topic of `T`.
+    ///
+    /// # Errors
+    /// When the manifest does not list the topic for this service, or shared memory refuses.
+    pub fn output<T: Message>(&mut self) -> Result<Output<T>, StartError> {
+        self.output_of(T::TOPIC)
+    }
+
+    /// The output of one topic of a family, such as `health/sonar`.
+    ///
+    /// # Errors
+    /// As [`Ports::output`].
+    pub fn output_of<T: Message>(&mut self, topic: &str) -> Result<Output<T>, StartError> {
+        if !access::may_publish(&self.manifest, &self.service, topic) {
+            return Err(self.refuse("publish", topic));
+        }
+        let kind = match &self.bus {
+            BusKind::Shared(node) => OutputKind::Shared(node.output(topic, &self.manifest)?),
+            BusKind::Lockstep(bus) => OutputKind::Lockstep(bus.output(topic)),
+        };
+        Ok(Output { kind, context: Rc::clone(&self.context), sequence: Rc::new(Cell::new(0)), refused: 0 })
+    }
+
+    /// Whether the manifest gives this service the device.
+    #[must_use]
+    pub fn has_device(&self, name: &str) -> bool {
+        access::device(&self.manifest, &self.service, name).is_some()
+    }
+
+    /// The device that the manifest calls `name` for this service.
+    ///
+    /// # Errors
+    /// When the manifest does not list it, or there can be no such device.
+    pub fn device(&mut self, name: &str) -> Result<Box<dyn ByteDevice>, StartError> {
+        let Some(path) = access::device(&self.manifest, &self.service, name) else {
+            return Err(self.refuse("use device", name));
+        };
+        match &self.bus {
+            BusKind::Lockstep(bus) => Ok(bus.device(name)),
+            BusKind::Shared(node) => {
+                let path = node.device_path(&path)?;
+                self.devices.device(name, &path)
+            }
+        }
+    }
+
+    /// After a restart: the last valid sample of a retained topic, from the keeper. `None` at the first
+    /// start, and when nothing was ever published.
+    ///
+    /// # Errors
+    /// When shared memory refuses.
+    pub fn retained<T: Message>(&mut self) -> Result<Option<Box<T>>, StartError> {
+        if !self.retained.iter().any(|topic| topic == T::TOPIC) {
+            return Ok(None);
+        }
+        match &self.bus {
+            BusKind::Shared(node) => node.retained(),
+            BusKind::Lockstep(bus) => Ok(bus.retained()),
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! A service as its own process.
+
+use crate::config::parse_config;
+use crate::device::Devices;
+use crate::port::{BusKind, StepContext};
+use crate::shm::{RunDir, SharedNode};
+use crate::{Cache, Input, Output, Ports, Service, Start, StartError, fnv};
+use ipc_types::{Health, MAX_PORTS, Message, Text, Trace};
+use manifest::Manifest;
+use sd_notify::NotifyState;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// The environment in which the supervisor starts a service.
+pub mod env {
+    /// Manifest and overlays, separated by `:`.
+    pub const MANIFEST: &str = "SERENO_MANIFEST";
+    /// The run directory of the system.
+    pub const RUN_DIR: &str = "SERENO_RUN_DIR";
+    /// Seed of the system; services derive their own from it.
+    pub const SEED: &str = "SERENO_SEED";
+    /// Which start of this service, from 0.
+    pub const INCARNATION: &str = "SERENO_INCARNATION";
+    /// Retained topics that the keeper offers to this start, separated by `,`.
+    pub const RETAINED: &str = "SERENO_RETAINED";
+    /// Set while a supervisor watches: the service dies with it.
+    pub const SUPERVISED: &str = "SERENO_SUPERVISED";
+}
+
+/// Now, nanoseconds of `CLOCK_MONOTONIC`.
+#[must_use]
+pub fn monotonic_ns() -> u64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+    time.tv_sec.cast_unsigned() * 1_000_000_000 + time.tv_nsec.cast_unsigned()
+}
+
+/// Runs a service as this process until SIGTERM; the whole `main` of a service.
+pub fn main<S: Service>(devices: impl Devices + 'static) -> ExitCode {
+    tracing_subscriber::fmt().with_writer(std::io::stderr).with_target(false).without_time().init();
+    match run::<S>(Box::new(devices)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            tracing::error!("{}: {error}", S::NAME);
+            let _ = sd_notify::notify(&[NotifyState::Status(&format!("cannot start: {error}"))]);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.is_empty())
+}
+
+fn number<N: std::str::FromStr>(name: &str, absent: N) -> Result<N, StartError> {
+    match variable(name) {
+        None => Ok(absent),
+        Some(text) => {
+            text.parse().map_err(|_| StartError::Invalid(format!("{name}={text} is not a number in range")))
+        }
+    }
+}
+
+/// Reads the manifest and its overlays, given as paths separated by `:`.
+///
+/// # Errors
+/// When a file is missing or wrong, or the wiring does not hold together.
+pub fn load_manifest(paths: &str) -> Result<(Manifest, PathBuf), StartError> {
+    let mut loaded: Option<(Manifest, PathBuf)> = None;
+    for path in paths.split(':').filter(|path| !path.is_empty()) {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| StartError::Read { path: path.to_owned(), source })?;
+        loaded = Some(match loaded {
+            None => {
+                let root = Path::new(path).parent().unwrap_or(Path::new(".")).to_owned();
+                (Manifest::parse(path, &text).map_err(|error| StartError::Manifest(error.to_string()))?, root)
+            }
+            Some((manifest, root)) => {
+                (manifest.overlay(path, &text).map_err(|error| StartError::Manifest(error.to_string()))?, root)
+            }
+        });
+    }
+    let (manifest, root) =
+        loaded.ok_or_else(|| StartError::Manifest(format!("{} names no manifest", env::MANIFEST)))?;
+    manifest.check(&known_topics()).map_err(|error| StartError::Manifest(error.to_string()))?;
+    Ok((manifest, root))
+}
+
+/// Every topic that a message type is known for; families by their first part.
+#[must_use]
+pub fn known_topics() -> Vec<&'static str> {
+    struct Names(Vec<&'static str>);
+    impl ipc_types::TopicVisitor for Names {
+        type Output = ();
+        fn visit<T: Message>(&mut self) {
+            self.0.push(T::TOPIC);
+        }
+    }
+    let mut names = Names(Vec::new());
+    ipc_types::visit_all(&mut names);
+    names.0
+}
+
+fn run<S: Service>(devices: Box<dyn Devices>) -> Result<(), StartError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(StartError::invalid)?;
+    }
+    if variable(env::SUPERVISED).is_some() {
+        // Without its supervisor nobody would ever restart or stop this process.
+        rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))
+            .map_err(StartError::invalid)?;
+    }
+    let paths = variable(env::MANIFEST)
+        .ok_or_else(|| StartError::Manifest(format!("{} is not set: which manifest?", env::MANIFEST)))?;
+    let (manifest, root) = load_manifest(&paths)?;
+    let run_dir = RunDir::new(
+        variable(env::RUN_DIR)
+            .ok_or_else(|| StartError::Manifest(format!("{} is not set: which run directory?", env::RUN_DIR)))?,
+    );
+    let incarnation = number(env::INCARNATION, 0_u32)?;
+    let entry = manifest
+        .services
+        .get(S::NAME)
+        .ok_or_else(|| StartError::Manifest(format!("{} has no service {}", manifest.file, S::NAME)))?;
+
+    let mut config_hash = 0;
+    let config = if entry.config.is_empty() {
+        S::Config::default()
+    } else {
+        let path = root.join(&entry.config);
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| StartError::Read { path: path.display().to_string(), source })?;
+        config_hash = fnv(text.as_bytes());
+        parse_config(&entry.config, &text)?
+    };
+    let simulated = manifest.system.simulated;
+    let start = Start::new(
+        manifest.system.clone(),
+        &root,
+        Start::service_seed(number(env::SEED, 0)?, S::NAME),
+        incarnation,
+        simulated,
+        Cache::default(),
+    )?;
+
+    let node = SharedNode::open(S::NAME, &run_dir, simulated)?;
+    let listener = node.listener(S::NAME)?;
+    let context = StepContext::new(S::NAME, incarnation);
+    context.now.set(monotonic_ns());
+    let heartbeat = Duration::from_millis(u64::from(entry.heartbeat_ms.max(30))) / 3;
+    let period_ns = if entry.tick_hz > 0.0 { (1e9 / entry.tick_hz) as u64 } else { u64::MAX };
+    let mut ports = Ports {
+        bus: BusKind::Shared(Rc::clone(&node)),
+        service: S::NAME.to_owned(),
+        manifest: Rc::new(manifest),
+        context: Rc::clone(&context),
+        inputs: Vec::new(),
+        devices,
+        retained: variable(env::RETAINED).unwrap_or_default().split(',').map(str::to_owned).collect(),
+    };
+    let mut journal = Journal::open(&mut ports, S::NAME)?;
+    let mut service = S::start(config, &mut ports, &start)?;
+    journal.begin(&start, config_hash, &context);
+    let _ = sd_notify::notify(&[NotifyState::Ready]);
+    tracing::info!("{} ready (start {incarnation})", S::NAME);
+
+    let mut next_tick = monotonic_ns();
+    let mut next_heartbeat = next_tick;
+    while !stop.load(Ordering::Relaxed) {
+        let now = monotonic_ns();
+        let due = next_tick.min(next_heartbeat);
+        let mut woken = false;
+        if now < due {
+            let wait = Duration::from_nanos(due - now);
+            // An interrupted wait is a signal: the loop looks at `stop` next.
+            let _ = listener.timed_wait(|_| woken = true, wait);
+        } else {
+            let _ = listener.try_wait(|_| woken = true);
+        }
+        let now = monotonic_ns();
+        let lateness = now.saturating_sub(next_tick);
+        if woken || now >= next_tick {
+            if now >= next_tick && period_ns != u64::MAX {
+                // Missed ticks are not made up for: the next one keeps the raster.
+                let missed = (now - next_tick) / period_ns;
+                next_tick += (missed + 1) * period_ns;
+            } else if period_ns == u64::MAX {
+                next_tick = u64::MAX;
+            }
+            context.now.set(now);
+            service.step(now);
+            journal.step(now, &ports, monotonic_ns() - now, lateness);
+        }
+        if now >= next_heartbeat {
+            next_heartbeat = now + heartbeat.as_nanos() as u64;
+            let mut text = Text::<96>::default();
+            service.status(&mut text);
+            let _ = sd_notify::notify(&[NotifyState::Watchdog, NotifyState::Status(text.as_str())]);
+            journal.report(&text, service.refused(), &ports);
+            node.serve_late_joiners();
+        }
+    }
+    let _ = sd_notify::notify(&[NotifyState::Stopping]);
+    tracing::info!("{} stopped", S::NAME);
+    Ok(())
+}
+
+/// `trace/<service>` and `health/<service>`.
+struct Journal {
+    trace: Output<Trace>,
+    health: Output<Health>,
+    step: u64,
+    seed: u64,
+    config: u64,
+    plan: u64,
+    longest: u64,
+    total: u64,
+    counted: u64,
+    lateness: u64,
+}
+
+impl Journal {
+    fn open(ports: &mut Ports, name: &str) -> Result<Self, StartError> {
+        Ok(Self {
+            trace: ports.output_of(&format!("{}/{name}", Trace::TOPIC))?,
+            health: ports.output_of(&format!("{}/{name}", Health::TOPIC))?,
+            step: 0,
+            seed: 0,
+            config: 0,
+            plan: 0,
+            longest: 0,
+            total: 0,
+            counted: 0,
+            lateness: 0,
+        })
+    }
+
+    fn begin(&mut self, start: &Start, config: u64, context: &StepContext) {
+        self.seed = start.seed;
+        self.config = config;
+        self.plan = start.plan_hash.get();
+        if let Some(mut loan) = self.trace.loan() {
+            *loan = Trace {
+                now_ns: context.now.get(),
+                seed: self.seed,
+                config: self.config,
+                plan: self.plan,
+                ..Trace::default()
+            };
+            loan.send();
+        }
+    }
+
+    fn step(&mut self, now: u64, ports: &Ports, took: u64, lateness: u64) {
+        self.step += 1;
+        self.longest = self.longest.max(took);
+        self.total += took;
+        self.counted += 1;
+        self.lateness = self.lateness.max(lateness);
+        let Some(mut loan) = self.trace.loan() else { return };
+        let trace: &mut Trace = &mut loan;
+        trace.step = self.step;
+        trace.now_ns = now;
+        trace.seed = self.seed;
+        trace.config = self.config;
+        trace.plan = self.plan;
+        trace.ports = ports.inputs.len().min(MAX_PORTS) as u32;
+        trace.reserved = 0;
+        for (slot, input) in trace.drained.iter_mut().zip(&ports.inputs) {
+            *slot = input.drain();
+        }
+        loan.send();
+    }
+
+    fn report(&mut self, text: &Text<96>, refused: u64, ports: &Ports) {
+        let health = Health {
+            steps: self.step,
+            lost: ports.inputs.iter().map(|input| input.lost()).sum(),
+            refused,
+            longest_step_ns: self.longest,
+            mean_step_ns: self.total / self.counted.max(1),
+            lateness_ns: self.lateness,
+            pid: std::process::id(),
+            status: *text,
+            ..Health::default()
+        };
+        self.health.publish(&health);
+        (self.longest, self.total, self.counted, self.lateness) = (0, 0, 0, 0);
+    }
+}
+
+/// Ports of a program beside the services: the command line, a scorer, a test.
+pub struct Tool {
+    /// Its ports, checked against its entry among the manifest's tools.
+    pub ports: Ports,
+    node: Rc<SharedNode>,
+}
+
+impl Tool {
+    /// Joins a running system.
+    ///
+    /// # Errors
+    /// When the manifest or the shared memory refuses.
+    pub fn join(name: &str, manifest: Manifest, run_dir: &RunDir) -> Result<Self, StartError> {
+        let node = SharedNode::open(name, run_dir, true)?;
+        let context = StepContext::new(name, std::process::id());
+        context.now.set(monotonic_ns());
+        let ports = Ports {
+            bus: BusKind::Shared(Rc::clone(&node)),
+            service: name.to_owned(),
+            manifest: Rc::new(manifest),
+            context,
+            inputs: Vec::new(),
+            devices: Box::new(crate::NoDevices),
+            retained: Vec::new(),
+        };
+        Ok(Self { ports, node })
+    }
+
+    /// Sets the time that messages sent from now on are stamped with.
+    pub fn tick(&self) {
+        self.ports.context.now.set(monotonic_ns());
+        self.node.serve_late_joiners();
+    }
+
+    /// Whether an input has something: takes the newest message.
+    pub fn latest<T: Message>(input: &mut Input<T>) -> Option<T> {
+        input.latest().map(|guard| *guard)
+    }
+}

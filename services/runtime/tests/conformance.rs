@@ -1,0 +1,296 @@
+//! One suite, two buses: the rules of `Input` and `Output` hold on shared memory and in lockstep alike.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use ipc_types::{Particles, PilotState, Pose, Setpoint};
+use manifest::Manifest;
+use runtime::shm::{Holder, RunDir};
+use runtime::{Cache, Lockstep, Ports, Tool};
+
+const MANIFEST: &str = r#"
+[system]
+name = "conformance"
+plan = "plan.yaml"
+vehicle = "vehicle.toml"
+simulated = true
+[service.writer]
+run = "writer"
+criticality = "flight"
+tick_hz = 10
+publishes.'localization/pose' = { hz = 20 }
+publishes.'localization/particles' = { hz = 20, retained = true }
+publishes.'pilot/state' = { hz = 5, retained = true }
+[service.reader]
+run = "reader"
+criticality = "mission"
+tick_hz = 10
+subscribes.'localization/pose' = { depth = 16, wake = true }
+subscribes.'localization/particles' = { depth = 2 }
+"#;
+
+fn manifest() -> Manifest {
+    Manifest::parse("conformance.toml", MANIFEST).unwrap()
+}
+
+/// A bus as the suite sees it: ports for either service, and a way to let messages arrive.
+trait Bus {
+    fn ports(&mut self, service: &str) -> Ports;
+    fn settle(&mut self);
+}
+
+struct Simulated(Lockstep);
+impl Bus for Simulated {
+    fn ports(&mut self, service: &str) -> Ports {
+        self.0.tool(service)
+    }
+    fn settle(&mut self) {
+        // Longer than the longest delay of the lockstep bus.
+        let now = self.0.now();
+        self.0.run_until(now + 20_000_000);
+    }
+}
+
+struct Shared {
+    tools: Vec<Tool>,
+    holder: Option<Holder>,
+    run_dir: RunDir,
+    _directory: tempfile::TempDir,
+}
+impl Shared {
+    fn new() -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let run_dir = RunDir::new(directory.path());
+        run_dir.wipe();
+        let holder = Holder::create(&manifest(), &run_dir).unwrap();
+        Self { tools: Vec::new(), holder: Some(holder), run_dir, _directory: directory }
+    }
+}
+impl Bus for Shared {
+    fn ports(&mut self, service: &str) -> Ports {
+        Tool::join(service, manifest(), &self.run_dir).map(|tool| {
+            let Tool { ports, .. } = tool;
+            ports
+        })
+        .unwrap()
+    }
+    fn settle(&mut self) {
+        for tool in &self.tools {
+            tool.tick();
+        }
+    }
+}
+impl Drop for Shared {
+    fn drop(&mut self) {
+        self.tools.clear();
+        self.holder = None;
+        self.run_dir.wipe();
+    }
+}
+
+fn on_both(test: impl Fn(&mut dyn Bus)) {
+    test(&mut Simulated(Lockstep::new(manifest(), std::path::Path::new("."), 7, Cache::default())));
+    test(&mut Shared::new());
+}
+
+fn pose(x_m: f32) -> Pose {
+    Pose { x_m, ..Pose::default() }
+}
+
+#[test]
+fn a_message_arrives_with_its_header() {
+    on_both(|bus| {
+        let mut output = bus.ports("writer").output::<Pose>().unwrap();
+        let mut input = bus.ports("reader").input::<Pose>(4).unwrap();
+        assert!(output.publish(&pose(1.0)));
+        assert!(output.publish(&pose(2.0)));
+        bus.settle();
+        let first = input.receive().unwrap();
+        assert_eq!((first.x_m, first.header.sequence), (1.0, 1));
+        assert_ne!(first.header.publisher, 0);
+        let second = input.receive().unwrap();
+        assert_eq!((second.x_m, second.header.sequence), (2.0, 2));
+        assert!(input.receive().is_none());
+        assert_eq!(input.lost(), 0);
+    });
+}
+
+#[test]
+fn the_oldest_is_dropped_and_counted() {
+    on_both(|bus| {
+        let mut output = bus.ports("writer").output::<Pose>().unwrap();
+        let mut input = bus.ports("reader").input::<Pose>(2).unwrap();
+        assert!(output.publish(&pose(0.0)));
+        bus.settle();
+        assert!(input.receive().is_some());
+        for x in 1..=5 {
+            assert!(output.publish(&pose(x as f32)));
+        }
+        bus.settle();
+        assert_eq!(input.receive().unwrap().x_m, 4.0);
+        assert_eq!(input.receive().unwrap().x_m, 5.0);
+        assert!(input.receive().is_none());
+        assert_eq!(input.lost(), 3);
+    });
+}
+
+#[test]
+fn a_late_joiner_gets_the_newest_and_nothing_older() {
+    on_both(|bus| {
+        let mut output = bus.ports("writer").output::<Pose>().unwrap();
+        assert!(output.publish(&pose(1.0)));
+        assert!(output.publish(&pose(2.0)));
+        let mut input = bus.ports("reader").input::<Pose>(4).unwrap();
+        // The next send tells the publisher of its new reader (between sends the runtime does).
+        assert!(output.publish(&pose(3.0)));
+        bus.settle();
+        assert_eq!(input.receive().unwrap().x_m, 2.0);
+        assert_eq!(input.receive().unwrap().x_m, 3.0);
+        assert!(input.receive().is_none());
+    });
+}
+
+#[test]
+fn a_dropped_loan_is_never_seen_and_costs_no_sequence_number() {
+    on_both(|bus| {
+        let mut output = bus.ports("writer").output::<Pose>().unwrap();
+        let mut input = bus.ports("reader").input::<Pose>(4).unwrap();
+        for _ in 0..40 {
+            let mut loan = output.loan().unwrap();
+            loan.x_m = 9.0;
+        }
+        assert!(output.publish(&pose(1.0)));
+        bus.settle();
+        let only = input.receive().unwrap();
+        assert_eq!((only.x_m, only.header.sequence), (1.0, 1));
+        assert!(input.receive().is_none());
+    });
+}
+
+#[test]
+fn a_held_message_stays_as_it_is() {
+    on_both(|bus| {
+        let mut output = bus.ports("writer").output::<Pose>().unwrap();
+        let mut input = bus.ports("reader").input::<Pose>(1).unwrap();
+        assert!(output.publish(&pose(1.0)));
+        bus.settle();
+        let held = input.receive().unwrap();
+        for x in 2..60 {
+            assert!(output.publish(&pose(x as f32)));
+            bus.settle();
+            assert_eq!(input.receive().unwrap().x_m, x as f32);
+        }
+        assert_eq!(held.x_m, 1.0);
+    });
+}
+
+#[test]
+fn a_port_that_the_manifest_does_not_list_is_refused_by_name() {
+    on_both(|bus| {
+        let mut ports = bus.ports("reader");
+        let text = ports.output::<Pose>().map(|_| ()).unwrap_err().to_string();
+        assert!(text.contains("reader") && text.contains("publish localization/pose"), "{text}");
+        let text = ports.input::<Setpoint>(1).map(|_| ()).unwrap_err().to_string();
+        assert!(text.contains("subscribe navigation/setpoint"), "{text}");
+        assert!(ports.device("controller").is_err());
+        assert!(ports.output_of::<ipc_types::Health>("health/reader").is_ok());
+        assert!(ports.output_of::<ipc_types::Health>("health/writer").is_err());
+    });
+}
+
+/// `localization/pose` as another version of the words would have it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+struct OldPose {
+    header: ipc_types::Header,
+    x_m: f64,
+}
+impl ipc_types::Field for OldPose {
+    const LAYOUT: u64 = 1;
+    fn write_json(&self, _: &mut dyn std::fmt::Write) -> std::fmt::Result {
+        Ok(())
+    }
+}
+impl ipc_types::Message for OldPose {
+    const TOPIC: &'static str = "localization/pose";
+    fn header(&self) -> &ipc_types::Header {
+        &self.header
+    }
+    fn header_mut(&mut self) -> &mut ipc_types::Header {
+        &mut self.header
+    }
+}
+
+#[test]
+fn a_stale_binary_fails_at_open_with_one_clear_sentence() {
+    let mut bus = Shared::new();
+    let text = bus.ports("reader").input::<OldPose>(1).map(|_| ()).unwrap_err().to_string();
+    assert!(text.contains("localization/pose") && text.contains("another layout"), "{text}");
+    assert!(bus.ports("reader").input::<Pose>(1).is_ok());
+}
+
+#[test]
+fn what_is_retained_outlives_its_publisher() {
+    let mut bus = Shared::new();
+    {
+        let mut ports = bus.ports("writer");
+        let mut state = ports.output::<PilotState>().unwrap();
+        let mut particles = ports.output::<Particles>().unwrap();
+        for count in 1..=3 {
+            assert!(state.publish(&PilotState { height_m: count as f32, ..Default::default() }));
+            let mut loan = particles.loan().unwrap();
+            loan.count = count;
+            loan.x_m[49_999] = count as f32;
+            loan.send();
+            if let Some(holder) = &mut bus.holder {
+                holder.keep();
+            }
+        }
+    }
+    let Some(holder) = &mut bus.holder else { unreachable!() };
+    let mut topics = holder.restore("writer");
+    holder.cleanup_dead_nodes();
+    topics.sort();
+    assert_eq!(topics, ["localization/particles", "pilot/state"]);
+    assert_eq!(holder.pilot_state().unwrap().height_m, 3.0);
+    assert!(holder.restore("reader").is_empty());
+}
+
+#[test]
+fn nothing_stays_in_shared_memory() {
+    let run_dir;
+    {
+        let mut bus = Shared::new();
+        run_dir = bus.run_dir.clone();
+        let mut output = bus.ports("writer").output::<Pose>().unwrap();
+        let mut input = bus.ports("reader").input::<Pose>(4).unwrap();
+        assert!(output.publish(&pose(1.0)));
+        assert!(input.receive().is_some());
+        assert!(!run_dir.leftovers().is_empty());
+    }
+    assert_eq!(run_dir.leftovers(), Vec::<String>::new());
+}
+
+#[test]
+fn the_lockstep_clock_orders_and_repeats() {
+    let arrivals = |seed: u64| {
+        let mut bus = Lockstep::new(manifest(), std::path::Path::new("."), seed, Cache::default());
+        let mut output = bus.tool("writer").output::<Pose>().unwrap();
+        let mut input = bus.tool("reader").input::<Pose>(16).unwrap();
+        let mut seen = Vec::new();
+        for step in 0..2000_u64 {
+            bus.run_until(step * 100_000);
+            if step % 10 == 0 {
+                assert!(output.publish(&pose(step as f32)));
+            }
+            while let Some(message) = input.receive() {
+                seen.push((bus.now(), message.header.sequence));
+            }
+        }
+        seen
+    };
+    let first = arrivals(3);
+    assert_eq!(first, arrivals(3));
+    assert_ne!(first, arrivals(4));
+    assert!(first.windows(2).all(|pair| pair[0].1 + 1 == pair[1].1));
+    // No message is visible in the step in which it was sent.
+    assert!(first.iter().all(|(at, sequence)| *at > (sequence - 1) * 1_000_000));
+}

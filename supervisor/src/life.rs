@@ -1,0 +1,469 @@
+//! The life of one service as a table of states: what to do when it starts, beats, ends or is told to. Pure:
+//! time is an argument, processes are somebody else's.
+
+use manifest::{Restart, RestartPolicy, ServiceEntry};
+use std::time::{Duration, Instant};
+
+/// After how many short lives in a row a service is called failing.
+const FAILING_AFTER: u32 = 3;
+
+/// What follows when a process that was told to end has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Then {
+    /// What the restart policy says.
+    Policy,
+    /// Start again at once.
+    Respawn,
+    /// Stay away until released.
+    Hold,
+    /// Nothing more.
+    End,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// No process; one is to be started then.
+    Waiting(Instant),
+    /// A process that has not yet said that it is ready.
+    Starting,
+    /// A process that beats.
+    Running,
+    /// A process that was told to end, and when it is killed (`None`: it was).
+    Dying(Option<Instant>, Then),
+    /// No process by order of a human.
+    Held,
+    /// No process: policy or shutdown.
+    Ended,
+}
+
+/// What the caller has to do to the process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Start one.
+    Spawn,
+    /// Ask it to end (SIGTERM).
+    Terminate,
+    /// End it (SIGKILL): it was told to end and did not.
+    Kill,
+    /// End it (SIGKILL): it did not become ready in time.
+    KillLate,
+    /// End it (SIGKILL): it no longer beats.
+    KillHung,
+}
+
+/// Time limits of a life.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// From spawn to ready.
+    pub start: Duration,
+    /// From being told to end to being killed.
+    pub stop: Duration,
+    /// Between two beats.
+    pub heartbeat: Duration,
+    /// Delays between restarts.
+    pub policy: RestartPolicy,
+}
+
+/// The life of one service.
+#[derive(Debug, Clone)]
+pub struct Life {
+    restart: Restart,
+    limits: Limits,
+    state: State,
+    failures: u32,
+    spawns: u32,
+    restarts: u32,
+    spawned_at: Option<Instant>,
+    beat_at: Option<Instant>,
+}
+
+impl Life {
+    /// A service that is to be started now.
+    #[must_use]
+    pub fn new(entry: &ServiceEntry, start: Duration, stop: Duration, now: Instant) -> Self {
+        let heartbeat = Duration::from_millis(entry.heartbeat_ms.into());
+        Self {
+            restart: entry.restart,
+            limits: Limits { start, stop, heartbeat, policy: RestartPolicy::default() },
+            state: State::Waiting(now),
+            failures: 0,
+            spawns: 0,
+            restarts: 0,
+            spawned_at: None,
+            beat_at: None,
+        }
+    }
+
+    /// What is due by now. Each thing is said once.
+    pub fn due(&mut self, now: Instant) -> Option<Action> {
+        match self.state {
+            State::Waiting(at) if now >= at => Some(Action::Spawn),
+            State::Starting if self.spawned_at.is_some_and(|t| now >= t + self.limits.start) => {
+                self.state = State::Dying(None, Then::Policy);
+                Some(Action::KillLate)
+            }
+            State::Running if self.beat_at.is_some_and(|t| now >= t + self.limits.heartbeat) => {
+                self.state = State::Dying(None, Then::Policy);
+                Some(Action::KillHung)
+            }
+            State::Dying(Some(at), then) if now >= at => {
+                self.state = State::Dying(None, then);
+                Some(Action::Kill)
+            }
+            _ => None,
+        }
+    }
+
+    /// When [`Life::due`] has something to say at the earliest.
+    #[must_use]
+    pub fn deadline(&self) -> Option<Instant> {
+        match self.state {
+            State::Waiting(at) => Some(at),
+            State::Starting => self.spawned_at.map(|t| t + self.limits.start),
+            State::Running => self.beat_at.map(|t| t + self.limits.heartbeat),
+            State::Dying(at, _) => at,
+            State::Held | State::Ended => None,
+        }
+    }
+
+    /// A process was started.
+    pub fn spawned(&mut self, now: Instant) {
+        self.restarts += u32::from(self.spawns > 0);
+        self.spawns += 1;
+        self.spawned_at = Some(now);
+        self.beat_at = None;
+        self.state = State::Starting;
+    }
+
+    /// No process could be started: a short life.
+    pub fn spawn_failed(&mut self, now: Instant) {
+        self.spawned_at = Some(now);
+        self.end_by_policy(false, now);
+    }
+
+    /// The process says that it is ready.
+    pub fn ready(&mut self, now: Instant) {
+        if self.state == State::Starting {
+            self.state = State::Running;
+            self.beat_at = Some(now);
+        }
+    }
+
+    /// The process beats.
+    pub fn beat(&mut self, now: Instant) {
+        if self.state == State::Running {
+            self.beat_at = Some(now);
+        }
+    }
+
+    /// Nobody could have heard a beat for a while: the wait begins anew.
+    pub fn forgive(&mut self, now: Instant) {
+        if self.beat_at.is_some() {
+            self.beat_at = Some(now);
+        }
+        if self.state == State::Starting {
+            self.spawned_at = Some(now);
+        }
+    }
+
+    /// The process ended and was reaped.
+    pub fn ended(&mut self, success: bool, now: Instant) {
+        let then = if let State::Dying(_, then) = self.state { then } else { Then::Policy };
+        match then {
+            Then::Policy => self.end_by_policy(success, now),
+            Then::Respawn => {
+                self.failures = 0;
+                self.state = State::Waiting(now);
+            }
+            Then::Hold => self.state = State::Held,
+            Then::End => self.state = State::Ended,
+        }
+    }
+
+    fn end_by_policy(&mut self, success: bool, now: Instant) {
+        if self.spawned_at.is_some_and(|t| now.saturating_duration_since(t) >= self.limits.policy.healthy) {
+            self.failures = 0;
+        }
+        let again = match self.restart {
+            Restart::Always => true,
+            Restart::OnFailure => !success,
+            Restart::Never => false,
+        };
+        if again {
+            self.failures = self.failures.saturating_add(1);
+            self.state = State::Waiting(now + self.limits.policy.delay(self.failures));
+        } else {
+            self.state = State::Ended;
+        }
+    }
+
+    /// A human wants a new process.
+    ///
+    /// # Errors
+    /// When the service is held.
+    pub fn restart(&mut self, now: Instant) -> Result<Option<Action>, &'static str> {
+        match self.state {
+            State::Held | State::Dying(_, Then::Hold) => Err("it is held; release it instead"),
+            State::Waiting(_) | State::Ended => {
+                self.failures = 0;
+                self.state = State::Waiting(now);
+                Ok(None)
+            }
+            State::Starting | State::Running => Ok(Some(self.die(Then::Respawn, self.limits.stop, now))),
+            State::Dying(at, _) => {
+                self.state = State::Dying(at, Then::Respawn);
+                Ok(None)
+            }
+        }
+    }
+
+    /// A human wants no process until it is released.
+    ///
+    /// # Errors
+    /// When the service is held already.
+    pub fn hold(&mut self, now: Instant) -> Result<Option<Action>, &'static str> {
+        match self.state {
+            State::Held | State::Dying(_, Then::Hold) => Err("it is held already"),
+            State::Waiting(_) | State::Ended => {
+                self.state = State::Held;
+                Ok(None)
+            }
+            State::Starting | State::Running => Ok(Some(self.die(Then::Hold, self.limits.stop, now))),
+            State::Dying(at, _) => {
+                self.state = State::Dying(at, Then::Hold);
+                Ok(None)
+            }
+        }
+    }
+
+    /// A human no longer wants it held.
+    ///
+    /// # Errors
+    /// When the service is not held.
+    pub fn release(&mut self, now: Instant) -> Result<(), &'static str> {
+        match self.state {
+            State::Held => self.state = State::Waiting(now),
+            State::Dying(at, Then::Hold) => self.state = State::Dying(at, Then::Respawn),
+            _ => return Err("it is not held"),
+        }
+        self.failures = 0;
+        Ok(())
+    }
+
+    /// The system stops: end, and stay away. `limit` bounds the patience.
+    pub fn stop(&mut self, limit: Duration, now: Instant) -> Option<Action> {
+        match self.state {
+            State::Waiting(_) | State::Held | State::Ended => {
+                self.state = State::Ended;
+                None
+            }
+            State::Starting | State::Running => Some(self.die(Then::End, limit, now)),
+            State::Dying(at, _) => {
+                self.state = State::Dying(at.map(|at| at.min(now + limit)), Then::End);
+                None
+            }
+        }
+    }
+
+    fn die(&mut self, then: Then, limit: Duration, now: Instant) -> Action {
+        self.state = State::Dying(Some(now + limit), then);
+        Action::Terminate
+    }
+
+    /// Whether a process is being awaited that is not ready yet.
+    #[must_use]
+    pub fn is_starting(&self) -> bool {
+        self.state == State::Starting
+    }
+
+    /// The state in one word: waiting, failing, starting, running, stopping, held or ended.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self.state {
+            State::Waiting(_) | State::Starting if self.failures >= FAILING_AFTER => "failing",
+            State::Waiting(_) => "waiting",
+            State::Starting => "starting",
+            State::Running => "running",
+            State::Dying(..) => "stopping",
+            State::Held => "held",
+            State::Ended => "ended",
+        }
+    }
+
+    /// Which start the next process is, from 0.
+    #[must_use]
+    pub fn incarnation(&self) -> u32 {
+        self.spawns
+    }
+
+    /// Processes started after the first.
+    #[must_use]
+    pub fn restarts(&self) -> u32 {
+        self.restarts
+    }
+
+    /// Time since the last spawn.
+    #[must_use]
+    pub fn age(&self, now: Instant) -> Option<Duration> {
+        self.spawned_at.map(|t| now.saturating_duration_since(t))
+    }
+
+    /// Time since the last beat.
+    #[must_use]
+    pub fn beat_age(&self, now: Instant) -> Option<Duration> {
+        self.beat_at.map(|t| now.saturating_duration_since(t))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifest::Manifest;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    fn life(restart: &str) -> (Life, Instant) {
+        let text = format!(
+            "[system]\nname='s'\nplan='p'\nvehicle='v'\n[service.a]\nrun='a'\ntick_hz=1\nheartbeat_ms=500\nrestart='{restart}'"
+        );
+        let m = Manifest::parse("m", &text).unwrap();
+        let now = Instant::now();
+        (Life::new(&m.services["a"], Duration::from_secs(10), Duration::from_secs(2), now), now)
+    }
+
+    /// Runs the clock for `span`, a process dying at once whenever one is started; returns the starts.
+    fn starts_while_crashing(life: &mut Life, from: Instant, span: Duration) -> u32 {
+        let mut now = from;
+        let before = life.incarnation();
+        while now < from + span {
+            if life.due(now) == Some(Action::Spawn) {
+                life.spawned(now);
+                now += MS;
+                life.ended(false, now);
+            }
+            now += MS;
+        }
+        life.incarnation() - before
+    }
+
+    #[test]
+    fn a_crash_after_health_restarts_at_once() {
+        let (mut life, mut now) = life("always");
+        for _ in 0..3 {
+            assert_eq!(life.due(now), Some(Action::Spawn));
+            life.spawned(now);
+            life.ready(now + 30 * MS);
+            now += Duration::from_secs(6);
+            life.ended(false, now);
+        }
+        assert_eq!(life.due(now), Some(Action::Spawn));
+        assert_eq!((life.restarts(), life.word()), (2, "waiting"));
+    }
+
+    #[test]
+    fn a_service_that_always_dies_is_started_ever_more_rarely() {
+        let (mut life, now) = life("always");
+        // 0, 0, 50, 150, 350, 750, 1550, 3150, 5150, 7150, 9150 ms.
+        assert_eq!(starts_while_crashing(&mut life, now, Duration::from_secs(10)), 11);
+        assert_eq!(starts_while_crashing(&mut life, now + Duration::from_secs(10), Duration::from_secs(20)), 10);
+        assert_eq!(life.word(), "failing");
+    }
+
+    #[test]
+    fn policies_decide_what_a_clean_exit_means() {
+        for (policy, success, word) in [
+            ("always", true, "waiting"),
+            ("always", false, "waiting"),
+            ("on-failure", true, "ended"),
+            ("on-failure", false, "waiting"),
+            ("never", true, "ended"),
+            ("never", false, "ended"),
+        ] {
+            let (mut life, now) = life(policy);
+            life.spawned(now);
+            life.ready(now);
+            life.ended(success, now + MS);
+            assert_eq!(life.word(), word, "{policy} {success}");
+        }
+    }
+
+    #[test]
+    fn silence_is_killed_and_beats_prevent_it() {
+        let (mut life, t) = life("always");
+        life.spawned(t);
+        assert_eq!(life.due(t + 9999 * MS), None);
+        life.ready(t + 100 * MS);
+        assert_eq!(life.due(t + 599 * MS), None);
+        life.beat(t + 599 * MS);
+        assert_eq!(life.due(t + 1098 * MS), None);
+        assert_eq!(life.deadline(), Some(t + 1099 * MS));
+        life.forgive(t + 1098 * MS);
+        assert_eq!(life.due(t + 1597 * MS), None);
+        assert_eq!(life.due(t + 1598 * MS), Some(Action::KillHung));
+        assert_eq!(life.due(t + 1599 * MS), None, "said once");
+        life.ended(false, t + 1600 * MS);
+        assert_eq!(life.due(t + 1600 * MS), Some(Action::Spawn));
+    }
+
+    #[test]
+    fn a_start_that_never_becomes_ready_is_killed() {
+        let (mut life, t) = life("always");
+        life.spawned(t);
+        life.beat(t + 9 * Duration::from_secs(1));
+        assert_eq!(life.due(t + Duration::from_secs(10)), Some(Action::KillLate));
+    }
+
+    #[test]
+    fn hold_and_release() {
+        let (mut life, t) = life("always");
+        life.spawned(t);
+        life.ready(t);
+        assert_eq!(life.hold(t), Ok(Some(Action::Terminate)));
+        assert!(life.hold(t).is_err() && life.restart(t).is_err());
+        assert_eq!(life.due(t + 1999 * MS), None);
+        assert_eq!(life.due(t + 2000 * MS), Some(Action::Kill));
+        life.ended(false, t + 2001 * MS);
+        assert_eq!((life.word(), life.deadline()), ("held", None));
+        assert_eq!(life.due(t + 99_000 * MS), None);
+        assert_eq!(life.release(t + 99_000 * MS), Ok(()));
+        assert!(life.release(t + 99_000 * MS).is_err());
+        assert_eq!(life.due(t + 99_000 * MS), Some(Action::Spawn));
+    }
+
+    #[test]
+    fn a_wanted_restart_is_immediate_and_forgets_failures() {
+        let (mut life, t) = life("never");
+        starts_while_crashing(&mut life, t, 10 * MS);
+        assert_eq!(life.word(), "ended");
+        assert_eq!(life.restart(t + 20 * MS), Ok(None));
+        assert_eq!(life.due(t + 20 * MS), Some(Action::Spawn));
+        life.spawned(t + 20 * MS);
+        life.ready(t + 21 * MS);
+        assert_eq!(life.restart(t + 30 * MS), Ok(Some(Action::Terminate)));
+        life.ended(true, t + 31 * MS);
+        assert_eq!(life.due(t + 31 * MS), Some(Action::Spawn));
+    }
+
+    #[test]
+    fn stopping_ends_everything_for_good() {
+        for prepare in [0, 1, 2, 3] {
+            let (mut life, t) = life("always");
+            if prepare > 0 {
+                life.spawned(t);
+            }
+            if prepare > 1 {
+                life.ready(t);
+            }
+            if prepare > 2 {
+                assert_eq!(life.restart(t), Ok(Some(Action::Terminate)));
+            }
+            let wanted = matches!(prepare, 1 | 2).then_some(Action::Terminate);
+            assert_eq!(life.stop(500 * MS, t), wanted, "{prepare}");
+            if prepare > 0 {
+                assert_eq!(life.due(t + 500 * MS), Some(Action::Kill));
+                life.ended(false, t + 501 * MS);
+            }
+            assert_eq!((life.word(), life.due(t + 9000 * MS)), ("ended", None));
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The run directory: private, locked by one supervisor, empty again in the end.
+
+use crate::error::{SupervisorError, while_doing};
+use manifest::Manifest;
+use runtime::shm::RunDir;
+use rustix::fs::{FlockOperation, flock};
+use rustix::process::{Pid, Signal, kill_process};
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Longest path of a Unix socket (108 bytes with its NUL).
+const SOCKET_PATH: usize = 107;
+/// A killed process is gone within milliseconds unless it hangs in the kernel.
+const ORPHAN_PATIENCE: Duration = Duration::from_secs(3);
+
+/// Socket for requests inside a run directory.
+pub(crate) fn control_socket(run_dir: &Path) -> PathBuf {
+    run_dir.join("control.sock")
+}
+
+/// A run directory held by this process.
+#[derive(Debug)]
+pub(crate) struct Place {
+    pub(crate) run: RunDir,
+    logs: PathBuf,
+    logs_stay: bool,
+    /// Holds the lock for as long as it is open.
+    _lock: File,
+}
+
+impl Place {
+    /// Makes the directory, takes its lock, ends what an earlier supervisor left alive and wipes what it left
+    /// in shared memory.
+    pub(crate) fn take(path: &Path, logs: Option<&Path>) -> Result<Self, SupervisorError> {
+        let path = std::path::absolute(path).map_err(while_doing("run directory"))?;
+        let run = RunDir::new(path.clone());
+        let wrong = |reason: String| SupervisorError::RunDir { run_dir: path.clone(), reason };
+        if control_socket(&path).as_os_str().len() > SOCKET_PATH {
+            return Err(wrong(format!("too long for a socket inside it ({SOCKET_PATH} bytes): use --run-dir")));
+        }
+        run.create().map_err(|e| wrong(e.to_string()))?;
+        let metadata = std::fs::metadata(&path).map_err(while_doing(path.display().to_string()))?;
+        let user = rustix::process::geteuid().as_raw();
+        if metadata.uid() != user {
+            return Err(wrong(format!("belongs to user {}, not to user {user}: use --run-dir", metadata.uid())));
+        }
+        if metadata.mode() & 0o077 != 0 {
+            return Err(wrong(format!("is open to others (mode {:o}): chmod 700 it", metadata.mode() & 0o777)));
+        }
+        let lock = take_lock(&path)?;
+        end_orphans(&path)?;
+        run.wipe();
+        for socket in [control_socket(&path), path.join("notify.sock")] {
+            remove(&socket);
+        }
+        let logs_stay = logs.is_some();
+        let logs = logs.map_or_else(|| path.join("logs"), Path::to_owned);
+        std::fs::create_dir_all(&logs).map_err(while_doing(logs.display().to_string()))?;
+        Ok(Self { run, logs, logs_stay, _lock: lock })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        self.run.path()
+    }
+
+    pub(crate) fn control(&self) -> PathBuf {
+        control_socket(self.path())
+    }
+
+    pub(crate) fn notify(&self) -> PathBuf {
+        self.path().join("notify.sock")
+    }
+
+    pub(crate) fn changes(&self) -> PathBuf {
+        self.path().join("changes.toml")
+    }
+
+    pub(crate) fn log(&self, service: &str) -> PathBuf {
+        self.logs.join(format!("{service}.log"))
+    }
+
+    /// Removes everything that this system made; only its own names, since the directory may be a user's.
+    pub(crate) fn leave(self, manifest: &Manifest) {
+        self.run.wipe();
+        for file in [self.control(), self.notify(), self.changes()] {
+            remove(&file);
+        }
+        for path in manifest.services.values().flat_map(|s| s.devices.values()) {
+            if path.starts_with("@run/") {
+                remove(&self.run.resolve(path));
+            }
+        }
+        if !self.logs_stay {
+            let _ = std::fs::remove_dir_all(&self.logs);
+        }
+        remove(&self.path().join("lock"));
+        // Stays when somebody else's files are in it.
+        let _ = std::fs::remove_dir(self.path());
+    }
+}
+
+/// What is not there need not be removed; what cannot be removed is met again at the next start.
+fn remove(path: &Path) {
+    let _ = std::fs::remove_file(path);
+}
+
+fn take_lock(run_dir: &Path) -> Result<File, SupervisorError> {
+    let path = run_dir.join("lock");
+    let doing = || format!("lock {}", path.display());
+    loop {
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .mode(0o600)
+            .open(&path)
+            .map_err(while_doing(doing()))?;
+        match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => {}
+            Err(rustix::io::Errno::WOULDBLOCK) => {
+                let mut holder = String::new();
+                let _ = file.read_to_string(&mut holder);
+                let holder = holder.trim();
+                return Err(SupervisorError::AlreadyRunning {
+                    run_dir: run_dir.to_owned(),
+                    holder: if holder.is_empty() { "unknown".to_owned() } else { holder.to_owned() },
+                });
+            }
+            Err(error) => return Err(while_doing(doing())(error)),
+        }
+        // A supervisor that just left may have removed the file between our open and our lock.
+        let same = std::fs::metadata(&path)
+            .and_then(|there| file.metadata().map(|here| here.ino() == there.ino() && here.dev() == there.dev()));
+        if !same.unwrap_or(false) {
+            continue;
+        }
+        file.set_len(0).map_err(while_doing(doing()))?;
+        writeln!(file, "{}", std::process::id()).map_err(while_doing(doing()))?;
+        return Ok(file);
+    }
+}
+
+/// Services that outlived their supervisor hold shared memory that is about to be wiped.
+fn end_orphans(run_dir: &Path) -> Result<(), SupervisorError> {
+    let deadline = Instant::now() + ORPHAN_PATIENCE;
+    loop {
+        let orphans = orphans(run_dir);
+        if orphans.is_empty() {
+            return Ok(());
+        }
+        if Instant::now() >= deadline {
+            let pids: Vec<String> = orphans.iter().map(|p| p.as_raw_pid().to_string()).collect();
+            return Err(SupervisorError::Orphans { run_dir: run_dir.to_owned(), pids: pids.join(", ") });
+        }
+        for pid in orphans {
+            // Gone already is as good.
+            let _ = kill_process(pid, Signal::KILL);
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Processes that some supervisor of this run directory started, by their environment. A zombie has none.
+fn orphans(run_dir: &Path) -> Vec<Pid> {
+    let mark = [runtime::env::SUPERVISED.as_bytes(), b"=", run_dir.as_os_str().as_encoded_bytes()].concat();
+    let own = std::process::id().cast_signed();
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    entries
+        .filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok())
+        .filter(|pid| *pid != own)
+        .filter(|pid| {
+            std::fs::read(format!("/proc/{pid}/environ"))
+                .is_ok_and(|environment| environment.split(|b| *b == 0).any(|variable| variable == mark))
+        })
+        .filter_map(Pid::from_raw)
+        .collect()
+}
