@@ -365,7 +365,10 @@ mod tests {
         let (mut life, now) = life("always");
         // 0, 0, 50, 150, 350, 750, 1550, 3150, 5150, 7150, 9150 ms.
         assert_eq!(starts_while_crashing(&mut life, now, Duration::from_secs(10)), 11);
-        assert_eq!(starts_while_crashing(&mut life, now + Duration::from_secs(10), Duration::from_secs(20)), 10);
+        assert_eq!(
+            starts_while_crashing(&mut life, now + Duration::from_secs(10), Duration::from_secs(20)),
+            10
+        );
         assert_eq!(life.word(), "failing");
     }
 

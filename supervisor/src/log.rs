@@ -120,7 +120,8 @@ mod tests {
             log.push(&format!("{i}"), 0.0);
         }
         assert_eq!(log.tail(usize::MAX).len(), RING);
-        let on_disk: u64 = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().metadata().unwrap().len()).sum();
+        let on_disk: u64 =
+            std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().metadata().unwrap().len()).sum();
         assert!(on_disk <= 2 * (FILE + LINE as u64 + 16), "{on_disk}");
         assert!(on_disk > FILE / 2);
     }

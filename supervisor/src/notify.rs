@@ -64,7 +64,8 @@ impl NotifySocket {
             let mut control = RecvAncillaryBuffer::new(&mut space);
             let mut io = [IoSliceMut::new(&mut bytes)];
             let received =
-                recvmsg(&self.socket, &mut io, &mut control, RecvFlags::DONTWAIT | RecvFlags::CMSG_CLOEXEC).ok()?;
+                recvmsg(&self.socket, &mut io, &mut control, RecvFlags::DONTWAIT | RecvFlags::CMSG_CLOEXEC)
+                    .ok()?;
             let sender = control.drain().find_map(|message| match message {
                 RecvAncillaryMessage::ScmCredentials(credentials) => Some(credentials.pid),
                 _ => None,

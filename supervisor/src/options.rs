@@ -79,7 +79,8 @@ pub fn parse_arguments(arguments: impl Iterator<Item = String>) -> Result<Option
             "--logs" => options.logs = Some(value()?.into()),
             "--seed" => {
                 let text = value()?;
-                options.seed = text.parse().map_err(|_| wrong(format!("--seed {text} is not a whole number")))?;
+                options.seed =
+                    text.parse().map_err(|_| wrong(format!("--seed {text} is not a whole number")))?;
             }
             "--quiet" => options.echo = false,
             other if other.starts_with('-') => return Err(wrong(format!("unknown option {other}"))),

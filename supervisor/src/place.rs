@@ -39,16 +39,24 @@ impl Place {
         let run = RunDir::new(path.clone());
         let wrong = |reason: String| SupervisorError::RunDir { run_dir: path.clone(), reason };
         if control_socket(&path).as_os_str().len() > SOCKET_PATH {
-            return Err(wrong(format!("too long for a socket inside it ({SOCKET_PATH} bytes): use --run-dir")));
+            return Err(wrong(format!(
+                "too long for a socket inside it ({SOCKET_PATH} bytes): use --run-dir"
+            )));
         }
         run.create().map_err(|e| wrong(e.to_string()))?;
         let metadata = std::fs::metadata(&path).map_err(while_doing(path.display().to_string()))?;
         let user = rustix::process::geteuid().as_raw();
         if metadata.uid() != user {
-            return Err(wrong(format!("belongs to user {}, not to user {user}: use --run-dir", metadata.uid())));
+            return Err(wrong(format!(
+                "belongs to user {}, not to user {user}: use --run-dir",
+                metadata.uid()
+            )));
         }
         if metadata.mode() & 0o077 != 0 {
-            return Err(wrong(format!("is open to others (mode {:o}): chmod 700 it", metadata.mode() & 0o777)));
+            return Err(wrong(format!(
+                "is open to others (mode {:o}): chmod 700 it",
+                metadata.mode() & 0o777
+            )));
         }
         let lock = take_lock(&path)?;
         end_orphans(&path)?;
@@ -133,8 +141,9 @@ fn take_lock(run_dir: &Path) -> Result<File, SupervisorError> {
             Err(error) => return Err(while_doing(doing())(error)),
         }
         // A supervisor that just left may have removed the file between our open and our lock.
-        let same = std::fs::metadata(&path)
-            .and_then(|there| file.metadata().map(|here| here.ino() == there.ino() && here.dev() == there.dev()));
+        let same = std::fs::metadata(&path).and_then(|there| {
+            file.metadata().map(|here| here.ino() == there.ino() && here.dev() == there.dev())
+        });
         if !same.unwrap_or(false) {
             continue;
         }

@@ -30,7 +30,9 @@ const OVERSLEPT: Duration = Duration::from_millis(200);
 const LAND_AGAIN: Duration = Duration::from_secs(1);
 /// Patience with each service when there is a hurry.
 const HURRY: Duration = Duration::from_millis(500);
-/// Nicer than no service: a restart must not wait for those that still run.
+/// Requests of one connection answered in one turn: nobody keeps the loop from its services.
+const REQUESTS: usize = 8;
+/// Ahead of every service: a restart must not wait for those that still run.
 const NICENESS: i32 = -19;
 
 /// What the system is doing as a whole.
@@ -360,7 +362,8 @@ impl<S: SharedMemory> Supervisor<S> {
     fn serve(&mut self, now: Instant) {
         self.control.accept();
         for index in 0..self.control.connections.len() {
-            while let Some(request) = self.control.next_request(index) {
+            for _ in 0..REQUESTS {
+                let Some(request) = self.control.next_request(index) else { break };
                 let response = match request {
                     Ok(request) => self.answer(request, now),
                     Err(reason) => Response::Refused { reason },
@@ -388,10 +391,12 @@ impl<S: SharedMemory> Supervisor<S> {
             Request::Logs { service, lines } if service == "supervisor" => {
                 Response::Logs { lines: self.own_log.tail(lines) }
             }
-            Request::Logs { service, lines } => match self.children.iter().find(|c| c.entry.name == service) {
-                Some(child) => Response::Logs { lines: child.log.tail(lines) },
-                None => self.no_such(&service),
-            },
+            Request::Logs { service, lines } => {
+                match self.children.iter().find(|c| c.entry.name == service) {
+                    Some(child) => Response::Logs { lines: child.log.tail(lines) },
+                    None => self.no_such(&service),
+                }
+            }
             Request::Stop { now: at_once } => {
                 if self.phase == Phase::Running || at_once {
                     self.stop_wanted(at_once, now);
@@ -493,7 +498,8 @@ fn load(paths: &[PathBuf]) -> Result<(Manifest, String), SupervisorError> {
         })?);
     }
     let names = names.join(":");
-    let (manifest, _) = runtime::load_manifest(&names).map_err(|e| SupervisorError::Manifest(e.to_string()))?;
+    let (manifest, _) =
+        runtime::load_manifest(&names).map_err(|e| SupervisorError::Manifest(e.to_string()))?;
     Ok((manifest, names))
 }
 

@@ -1,3 +1,106 @@
-//! Build tasks: `cargo xtask demo`, `cargo xtask test`.
+//! Build tasks: `cargo xtask demo` and `cargo xtask test`.
+#![allow(clippy::print_stdout, reason = "build tasks say what they do")]
 
-fn main() {}
+use anyhow::{Context, Result, bail};
+use clap::{Parser, Subcommand};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::time::Instant;
+
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", about = "Build tasks of Sereno")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Build everything, fly one round of the demo building in the simulator, draw it and report on it.
+    Demo {
+        /// Exit non-zero unless the round ended on the pad without a contact.
+        #[arg(long)]
+        once: bool,
+        /// Seed of everything drawn at random.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Where to draw the flight.
+        #[arg(long, default_value = "flight.svg")]
+        picture: PathBuf,
+    },
+    /// Run every test.
+    Test,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let done = match arguments.task {
+        Task::Demo { once, seed, picture } => demo(once, seed, &picture),
+        Task::Test => test(),
+    };
+    match done {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("cargo xtask: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The checkout that this task was built from.
+fn checkout() -> Result<PathBuf> {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = manifest.ancestors().nth(2).context("deploy/xtask is not inside a checkout")?;
+    Ok(root.to_owned())
+}
+
+fn cargo(root: &Path, arguments: &[&str]) -> Result<()> {
+    println!("$ cargo {}", arguments.join(" "));
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let began = Instant::now();
+    let status = Command::new(cargo).args(arguments).current_dir(root).status().context("cannot run cargo")?;
+    println!("  {:.0} s", began.elapsed().as_secs_f64());
+    if !status.success() {
+        bail!("cargo {} failed", arguments.join(" "));
+    }
+    Ok(())
+}
+
+/// Executables of the system: one a service, the supervisor and the command line.
+const PROGRAMS: [&str; 9] = [
+    "cli", "supervisor", "sonar", "flow", "flight", "localization", "navigation", "pilot", "simulator",
+];
+
+fn build_programs(root: &Path) -> Result<PathBuf> {
+    println!("Building the services, the supervisor and the command line (a few minutes the first time):");
+    let mut arguments = vec!["build", "--release", "--bins"];
+    for program in PROGRAMS {
+        arguments.extend(["--package", program]);
+    }
+    cargo(root, &arguments)?;
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
+    Ok(root.join(target).join("release"))
+}
+
+fn demo(once: bool, seed: u64, picture: &Path) -> Result<ExitCode> {
+    let root = checkout()?;
+    let programs = build_programs(&root)?;
+    println!("Flying the demo building, seed {seed}:");
+    let mut command = Command::new(programs.join("sereno"));
+    command.arg("--deploy").arg(root.join("deploy")).args(["demo", "--seed", &seed.to_string()]);
+    command.arg("--picture").arg(picture);
+    if once {
+        command.arg("--once");
+    }
+    let status = command.status().context("cannot run sereno")?;
+    Ok(if status.success() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn test() -> Result<ExitCode> {
+    let root = checkout()?;
+    println!("Running every test: libraries, services, then the whole system as processes.");
+    // The system tests run the services as they are flown.
+    build_programs(&root)?;
+    cargo(&root, &["test", "--workspace", "--no-fail-fast"])?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -54,7 +54,13 @@ impl ArmSwitch {
             },
             // Started while motors are wanted: they may be turning, so the switch is high unless the
             // controller has said otherwise.
-            None => if evidence.armed == Some(false) { low(LOW_NS) } else { flying },
+            None => {
+                if evidence.armed == Some(false) {
+                    low(LOW_NS)
+                } else {
+                    flying
+                }
+            }
             Some(State::Low { needed, .. }) if !evidence.ready => low(needed),
             Some(State::Low { since, needed }) => {
                 if now.saturating_sub(since) >= needed && evidence.clear && evidence.armed == Some(false) {
@@ -87,6 +93,12 @@ impl ArmSwitch {
         };
         self.state = Some(state);
         !matches!(state, State::Low { .. })
+    }
+
+    /// Whether the aircraft is believed to be armed.
+    #[must_use]
+    pub fn flying(&self) -> bool {
+        matches!(self.state, Some(State::Flying { .. }))
     }
 
     /// Whether statuses are worth asking for more often: something is about to change.

@@ -71,7 +71,11 @@ impl Validate for Config {
         within("level_after_s", self.level_after_s, 0.05..=0.2)?;
         within("descend_after_s", self.descend_after_s, 0.15..=1.0)?;
         if self.descend_after_s <= self.level_after_s {
-            return Err(ConfigError::range("descend_after_s", self.descend_after_s, "more than level_after_s"));
+            return Err(ConfigError::range(
+                "descend_after_s",
+                self.descend_after_s,
+                "more than level_after_s",
+            ));
         }
         within("descend_m_s", self.descend_m_s, 0.1..=0.6)?;
         within("blind_hold_after_s", self.blind_hold_after_s, 0.1..=1.0)?;

@@ -204,8 +204,8 @@ impl Descent {
         };
         let bias = if blind { BLIND_BIAS_M_S2 } else { 0.0 };
         let slope = falling.slope();
-        falling.throttle_us = (falling.hover_us + (acceleration - falling.offset_m_s2 - bias) / slope)
-            .clamp(1050.0, 1900.0);
+        falling.throttle_us =
+            (falling.hover_us + (acceleration - falling.offset_m_s2 - bias) / slope).clamp(1050.0, 1900.0);
         let last_heard_m = self.sonar.range_m - self.sonar.standing_m;
         let touched = falling.touched(now, heard, last_heard_m);
         Some(DescentStep { throttle_us: falling.throttle_us, touched })

@@ -4,8 +4,8 @@ use crate::arming::Evidence;
 use crate::order::{ReceiverOrder, throttle_of};
 use crate::schedule::{Question, Schedule};
 use msp::messages::{
-    Analog, AnalogReply, ApiVersion, Arming, Attitude, AttitudeReply, BoxIds, FcVariant, FcVersion, Motor, Rc,
-    RxMap, SetRawRc, Status, StatusReply,
+    Analog, AnalogReply, ApiVersion, Arming, Attitude, AttitudeReply, BoxIds, FcVariant, FcVersion, Motor,
+    Rc, RxMap, SetRawRc, Status, StatusReply,
 };
 use msp::{Decoder, Direction, EncodeError, Frame, Request, Version, encode_request, parse_reply};
 
@@ -277,7 +277,8 @@ impl Link {
 
     fn answer(&mut self, now: u64, question: Question, direction: Direction, payload: &[u8]) -> bool {
         let Some(sent_ns) = self.asked_ns[question as usize].take() else { return false };
-        let understood = direction == Direction::Refusal || self.understand(now, sent_ns, question, payload).is_ok();
+        let understood =
+            direction == Direction::Refusal || self.understand(now, sent_ns, question, payload).is_ok();
         if understood && question.once() {
             self.settled[question as usize] = true;
         }
@@ -375,13 +376,17 @@ impl Link {
             true
         } else {
             // One between two frames, in the middle.
-            since(self.command_ns) >= SPACING_NS && (!self.asked_since_frame || since(self.frame_ns) > 40_000_000)
+            since(self.command_ns) >= SPACING_NS
+                && (!self.asked_since_frame || since(self.frame_ns) > 40_000_000)
         };
         if !spaced || self.asked_ns.iter().flatten().count() >= MOST_OUTSTANDING {
             return None;
         }
         if eager || orphan {
-            self.schedule.hurry(if orphan && self.armed() == Some(true) { Question::Rc } else { Question::Status }, now);
+            self.schedule.hurry(
+                if orphan && self.armed() == Some(true) { Question::Rc } else { Question::Status },
+                now,
+            );
         }
         let silent = self.silent(now);
         let (asked, settled) = (&self.asked_ns, &self.settled);

@@ -23,7 +23,8 @@ impl ReceiverOrder {
         for (index, position) in positions.iter_mut().enumerate().skip(usize::from(map.count)) {
             *position = index as u8;
         }
-        let taken = positions.iter().fold(0u32, |taken, at| taken | 1u32.checked_shl((*at).into()).unwrap_or(0));
+        let taken =
+            positions.iter().fold(0u32, |taken, at| taken | 1u32.checked_shl((*at).into()).unwrap_or(0));
         (taken == 0xff).then_some(Self { positions })
     }
 
@@ -34,7 +35,9 @@ impl ReceiverOrder {
         let mut arranged = *channels_us;
         let mut end = count;
         for (channel, &position) in self.positions.iter().enumerate() {
-            if let (Some(slot), Some(&us)) = (arranged.get_mut(usize::from(position)), channels_us.get(channel)) {
+            if let (Some(slot), Some(&us)) =
+                (arranged.get_mut(usize::from(position)), channels_us.get(channel))
+            {
                 *slot = us;
                 if channel < count {
                     end = end.max(usize::from(position) + 1);
@@ -69,11 +72,13 @@ mod tests {
 
     #[test]
     fn aetr_stays_and_taer_moves() {
-        let aetr = ReceiverOrder::read(&RxMapReply { positions: [0, 1, 3, 2, 4, 5, 6, 7], count: 8 }).unwrap();
+        let aetr =
+            ReceiverOrder::read(&RxMapReply { positions: [0, 1, 3, 2, 4, 5, 6, 7], count: 8 }).unwrap();
         assert_eq!(aetr.arrange(&OURS, 6), (OURS, 6));
         assert_eq!(aetr, ReceiverOrder::AETR);
         // TAER: throttle first, so roll is at 1, pitch at 2, yaw at 3, throttle at 0. INAV sends four.
-        let taer = ReceiverOrder::read(&RxMapReply { positions: [1, 2, 3, 0, 0, 0, 0, 0], count: 4 }).unwrap();
+        let taer =
+            ReceiverOrder::read(&RxMapReply { positions: [1, 2, 3, 0, 0, 0, 0, 0], count: 4 }).unwrap();
         let (channels, count) = taer.arrange(&OURS, 6);
         assert_eq!((count, &channels[..6]), (6, &[1102, 1100, 1101, 1103, 1104, 1105][..]));
     }

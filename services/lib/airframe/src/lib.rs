@@ -7,3 +7,6 @@ pub mod people;
 pub mod world;
 pub mod controller;
 pub mod vehicle;
+
+#[cfg(test)]
+mod testing;

@@ -11,19 +11,18 @@ pub struct ConfigError {
     /// Path of the setting, for example `motion.velocity_noise`.
     pub field: &'static str,
     /// What it was set to.
-    pub value: f64,
+    pub value: f32,
     /// Smallest value allowed.
-    pub low: f64,
+    pub low: f32,
     /// Largest value allowed.
-    pub high: f64,
+    pub high: f32,
 }
 
 pub(crate) fn within(field: &'static str, value: f32, range: RangeInclusive<f32>) -> Result<(), ConfigError> {
     if range.contains(&value) {
         Ok(())
     } else {
-        let [value, low, high] = [value, *range.start(), *range.end()].map(f64::from);
-        Err(ConfigError { field, value, low, high })
+        Err(ConfigError { field, value, low: *range.start(), high: *range.end() })
     }
 }
 
@@ -86,11 +85,13 @@ pub struct PopulationConfig {
     pub bin: f32,
     /// Height of those bins, radians.
     pub heading_bin: f32,
+    /// And their side in velocity, m/s: a set that does not know its speed needs far more particles.
+    pub velocity_bin: f32,
 }
 
 impl Default for PopulationConfig {
     fn default() -> Self {
-        Self { min: 800, max: 4_000, error: 0.04, bin: 0.1, heading_bin: 0.17 }
+        Self { min: 500, max: 4_000, error: 0.02, bin: 0.1, heading_bin: 0.17, velocity_bin: 0.2 }
     }
 }
 
@@ -146,6 +147,7 @@ impl Config {
         within("population.error", p.error, 0.001..=0.5)?;
         within("population.bin", p.bin, 0.02..=1.0)?;
         within("population.heading_bin", p.heading_bin, 0.02..=1.6)?;
+        within("population.velocity_bin", p.velocity_bin, 0.02..=2.0)?;
         within("resample.threshold", self.resample.threshold, 0.05..=1.0)?;
         self.motion.check()?;
         self.trust.check()

@@ -259,7 +259,8 @@ impl<M: RangeMap> Filter<M> {
         let across = |sigma: f32| (4.0 * sigma / p.bin).max(1.0);
         let area = core::f32::consts::FRAC_PI_4 * across(spread[0]) * across(spread[1]);
         let headings = (4.0 * estimate.heading_sigma / p.heading_bin).max(1.0);
-        let bins = (area * headings).max(2.0);
+        let velocities = (4.0 * estimate.velocity_sigma / p.velocity_bin).max(1.0).powi(2);
+        let bins = (area * headings * velocities).max(2.0);
         let k = bins - 1.0;
         let a = 2.0 / (9.0 * k);
         // 2.326: upper 1 % point of the standard normal.

@@ -111,11 +111,11 @@ impl SonarModel {
 
     /// Likelihood of `echo` to one who has no idea where on the plan it was made.
     pub(crate) fn blind_likelihood(&self, echo: Echo) -> f32 {
-        // Half of all rays end within the nearer 40 % of the reach, one in four hears nothing: typical of
-        // rooms and corridors, and only the order of magnitude matters.
+        // Of the cones in rooms and corridors about four in ten hear nothing, for want of a wall that faces
+        // them; echoes are the rarer the farther. Only the order of magnitude matters.
         match echo {
-            Echo::Nothing => 0.25,
-            Echo::Range(z) => 0.75 * (-z / (0.6 * self.config.max_range)).exp() / (0.487 * self.config.max_range),
+            Echo::Nothing => 0.4,
+            Echo::Range(z) => 0.6 * (-z / (0.6 * self.config.max_range)).exp() / (0.487 * self.config.max_range),
         }
     }
 

@@ -23,7 +23,6 @@ pub use file::{
 pub use ground::Ground;
 pub use query::{Nearest, RayHit};
 pub use solid::{Role, Shape, Solid, Surface};
-pub(crate) use solid::NO_OBJECT;
 pub(crate) use build::table as table_piece;
 pub(crate) use walls::{Edge, rectangles};
 

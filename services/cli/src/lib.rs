@@ -1,0 +1,6 @@
+//! What the command line shares with the tests: where the system's files are, and whole flights.
+#![forbid(unsafe_code)]
+
+pub mod flight;
+pub mod place;
+pub mod witness;

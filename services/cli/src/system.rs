@@ -1,0 +1,91 @@
+//! Commands about the services, over the supervisor's own socket.
+
+use crate::arguments::Up;
+use anyhow::Result;
+use cli::place::Place;
+use std::process::ExitCode;
+use std::time::Duration;
+use supervisor::Client;
+use supervisor::protocol::ServiceRow;
+
+/// A service that does not come up within this time is reported.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// A landing from any height and the end of all services.
+const DOWN_PATIENCE: Duration = Duration::from_secs(90);
+
+pub fn up(place: &Place, up: &Up) -> Result<ExitCode> {
+    let options = supervisor::Options {
+        manifests: place.manifest_files(up.sim)?,
+        run_dir: Some(place.run_dir()?),
+        logs: up.logs.clone(),
+        seed: up.seed,
+        echo: !up.quiet,
+        ..supervisor::Options::default()
+    };
+    supervisor::run(&options)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn client(place: &Place) -> Result<Client> {
+    Ok(Client::connect(&place.run_dir()?)?)
+}
+
+fn print_rows(rows: &[ServiceRow]) {
+    println!("{:<14} {:<9} {:>8} {:>8} {:>9}  what it says", "service", "state", "pid", "restarts", "up s");
+    for row in rows {
+        let pid = row.pid.map_or_else(|| "-".to_owned(), |pid| pid.to_string());
+        let age = row.age_s.map_or_else(|| "-".to_owned(), |age| format!("{age:.1}"));
+        let says = if row.status.is_empty() { &row.last_end } else { &row.status };
+        println!("{:<14} {:<9} {pid:>8} {:>8} {age:>9}  {says}", row.name, row.state, row.restarts);
+    }
+}
+
+pub fn ps(place: &Place, json: bool) -> Result<ExitCode> {
+    let overview = client(place)?.ps()?;
+    if json {
+        println!("{}", serde_json::to_string(&overview)?);
+    } else {
+        print_rows(&overview.services);
+        println!("{}, {}", overview.phase, if overview.airborne { "in the air" } else { "on the ground" });
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show(row: &ServiceRow, json: bool) -> Result<ExitCode> {
+    if json {
+        println!("{}", serde_json::to_string(row)?);
+    } else {
+        println!("{} is {}", row.name, row.state);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+pub fn restart(place: &Place, service: &str, in_flight: bool, json: bool) -> Result<ExitCode> {
+    show(&client(place)?.restart(service, in_flight, PATIENCE)?, json)
+}
+
+pub fn hold(place: &Place, service: &str, in_flight: bool, json: bool) -> Result<ExitCode> {
+    show(&client(place)?.hold(service, in_flight, PATIENCE)?, json)
+}
+
+pub fn release(place: &Place, service: &str, json: bool) -> Result<ExitCode> {
+    show(&client(place)?.release(service, PATIENCE)?, json)
+}
+
+pub fn logs(place: &Place, service: &str, lines: usize, json: bool) -> Result<ExitCode> {
+    let lines = client(place)?.logs(service, lines)?;
+    if json {
+        println!("{}", serde_json::to_string(&lines)?);
+    } else {
+        for line in lines {
+            println!("{line}");
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+pub fn down(place: &Place, now: bool, json: bool) -> Result<ExitCode> {
+    client(place)?.stop(now, DOWN_PATIENCE)?;
+    println!("{}", if json { "{\"stopped\":true}" } else { "stopped" });
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,214 @@
+//! The shield over a drawn building and over arbitrary readings.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use control::{Echo, Footing, Look, Shield, ShieldConfig, Vector};
+use floorplan::{DistanceField, Plan};
+use proptest::prelude::*;
+use std::f32::consts::{FRAC_PI_4, PI};
+
+const RADIUS: f32 = 0.225;
+const MOUNT: f32 = 0.12;
+
+fn eight() -> Shield {
+    let sonars = (0..8).map(|k| {
+        let bearing = k as f32 * FRAC_PI_4;
+        (k, bearing, Vector::along(bearing) * MOUNT)
+    });
+    Shield::new(ShieldConfig::default(), RADIUS, sonars)
+}
+
+fn at(place: Vector) -> Footing {
+    Footing { place: Some(place), sigma_m: 0.03, heading: 0.0 }
+}
+
+/// A wall with a door of 0.9 m, 0.2 m thick, between two rooms. 0.1 m a character.
+fn door() -> Plan {
+    let rows: Vec<String> = (0..40)
+        .map(|row| {
+            (0..60)
+                .map(|column| {
+                    let border = row == 0 || row == 39 || column == 0 || column == 59;
+                    let wall = (30..32).contains(&column) && !(16..25).contains(&row);
+                    if border || wall { '#' } else { '.' }
+                })
+                .collect()
+        })
+        .collect();
+    let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+    Plan::from_ascii(&rows, 0.1)
+}
+
+/// The nearest echo of a cone of seven rays that a wall sends back, or nothing.
+fn cone(plan: &Plan, place: Vector, bearing: f32) -> Echo {
+    let face = place + Vector::along(bearing) * MOUNT;
+    let mut nearest = f32::INFINITY;
+    for ray in -3..=3 {
+        let angle = bearing + ray as f32 * 5f32.to_radians();
+        if let Some(hit) = plan.cast_ray(face.x, face.y, angle, 4.0)
+            && hit.incidence_rad.abs() < 0.5
+        {
+            nearest = nearest.min(hit.range_m);
+        }
+    }
+    if nearest.is_finite() { Echo::Range(nearest) } else { Echo::Nothing }
+}
+
+/// Flies at a door, obeying the shield at once; side sonars in opposite pairs, 60 ms each.
+fn through(start: Vector, wish: Vector, seconds: f32) -> (Vector, f32, f32) {
+    let plan = door();
+    let walls = DistanceField::new(&plan, 2.0);
+    let origin = Vector::new(plan.origin().0, plan.origin().1);
+    let mut shield = eight();
+    shield.set_sweep(0.24);
+    let mut place = origin + start;
+    let (mut least, mut slowest) = (f32::INFINITY, f32::INFINITY);
+    for step in 0..(seconds / 0.02) as u64 {
+        let now = 1_000_000_000 + step * 20_000_000;
+        if step % 3 == 0 {
+            let pair = (step / 3 % 4) as usize;
+            for sensor in [pair, pair + 4] {
+                let echo = cone(&plan, place, sensor as f32 * FRAC_PI_4);
+                assert!(shield.hear(sensor, Look { at_ns: now, heading: 0.0, echo }));
+            }
+        }
+        let guarded = shield.guard(now, wish, &at(place), Some(&walls), true);
+        place += guarded.velocity * 0.02;
+        least = least.min(walls.distance(place.x, place.y) - RADIUS);
+        if step > 20 && (place.x - origin.x) < 4.0 {
+            slowest = slowest.min(guarded.velocity.x);
+        }
+    }
+    (place - origin, least, slowest)
+}
+
+#[test]
+fn a_centred_drone_passes_a_door_of_0_9_m() {
+    let (place, least, slowest) = through(Vector::new(1.5, 1.95), Vector::new(0.5, 0.0), 12.0);
+    assert!(place.x > 4.0, "stuck at {place:?}");
+    assert!(slowest >= 0.2, "slowest {slowest}");
+    assert!(least > 0.15, "{least}");
+}
+
+#[test]
+fn a_drone_that_is_off_the_middle_is_centred_on_the_way() {
+    for offset in [-0.12, -0.06, 0.06, 0.12] {
+        let (place, least, _) = through(Vector::new(1.5, 1.95 + offset), Vector::new(0.4, 0.0), 20.0);
+        assert!(place.x > 4.0, "offset {offset}: stuck at {place:?}");
+        assert!(least > 0.06, "offset {offset}: {least}");
+    }
+}
+
+#[test]
+fn no_wish_leads_into_a_wall() {
+    for k in 0..24 {
+        let wish = Vector::along(k as f32 * PI / 12.0) * 0.8;
+        let (place, least, _) = through(Vector::new(1.6, 1.0), wish, 12.0);
+        assert!(least > 0.0, "direction {k}: {least} at {place:?}");
+    }
+}
+
+#[test]
+fn no_sensor_looking_that_way_no_motion_that_way() {
+    let mut shield = eight();
+    let now = 10_000_000_000;
+    for k in 0..8 {
+        if k != 2 {
+            shield.hear(k, Look { at_ns: now, heading: 0.0, echo: Echo::Nothing });
+        }
+    }
+    assert_eq!(shield.silent(now), (1, 8));
+    let footing = Footing { place: None, sigma_m: 9.0, heading: 0.0 };
+    let left = shield.guard(now, Vector::new(0.0, 0.5), &footing, None, false);
+    assert_eq!(left.allowed_m_s, 0.0);
+    // What is left is turned out of the closed sector, 17 degrees on either side of the dead sensor.
+    assert!(left.velocity.angle() < 75f32.to_radians() || left.velocity.angle() > 105f32.to_radians());
+    let ahead = shield.guard(now, Vector::new(0.5, 0.0), &footing, None, false);
+    assert!(ahead.velocity.x > 0.45 && !ahead.limited);
+    // Two turns later nobody has looked anywhere.
+    let later = shield.guard(now + 500_000_000, Vector::new(0.5, 0.0), &footing, None, true);
+    assert_eq!(later.velocity, Vector::ZERO);
+    assert_eq!(shield.silent(now + 500_000_000), (8, 8));
+}
+
+#[test]
+fn the_plan_stops_what_no_echo_shows() {
+    // A glass wall: the plan has it, the sonars hear nothing.
+    let plan = door();
+    let walls = DistanceField::new(&plan, 2.0);
+    let origin = Vector::new(plan.origin().0, plan.origin().1);
+    let mut shield = eight();
+    let mut place = origin + Vector::new(1.5, 1.0);
+    for step in 0..600u64 {
+        let now = step * 20_000_000;
+        for k in 0..8 {
+            shield.hear(k, Look { at_ns: now, heading: 0.0, echo: Echo::Nothing });
+        }
+        place += shield.guard(now, Vector::new(0.6, 0.0), &at(place), Some(&walls), true).velocity * 0.02;
+    }
+    let gap = walls.distance(place.x, place.y);
+    assert!(gap > RADIUS - 0.09, "{gap}");
+}
+
+#[test]
+fn near_things_push_and_a_person_ahead_stops() {
+    let mut shield = eight();
+    for k in 0..8 {
+        let echo = if k == 0 { Echo::Range(0.35) } else { Echo::Nothing };
+        shield.hear(k, Look { at_ns: 0, heading: 0.0, echo });
+    }
+    let footing = Footing { place: None, sigma_m: 0.0, heading: 0.0 };
+    let still = shield.guard(0, Vector::ZERO, &footing, None, true).velocity;
+    assert!(still.x < -0.01 && still.x >= -0.12 && still.y.abs() < 1e-6, "{still:?}");
+    assert_eq!(shield.guard(0, Vector::ZERO, &footing, None, false).velocity, Vector::ZERO);
+    let ahead = shield.guard(0, Vector::new(0.5, 0.0), &footing, None, false).velocity;
+    assert!(shield.braking().distance(ahead.x) <= 0.35 + MOUNT - RADIUS);
+}
+
+proptest! {
+    #[test]
+    fn what_is_let_through_can_always_be_stopped(
+        ranges in proptest::collection::vec(prop_oneof![Just(None), (0.03f32..4.0).prop_map(Some)], 8),
+        ages in proptest::collection::vec(0u64..900, 8),
+        heading in -PI..PI,
+        wish in (-2.0f32..2.0, -2.0f32..2.0),
+        sweep in 0.1f32..1.0,
+        push in any::<bool>(),
+    ) {
+        let mut shield = eight();
+        shield.set_sweep(sweep);
+        let now = 10_000_000_000u64;
+        for (k, (range, age)) in ranges.iter().zip(&ages).enumerate() {
+            let echo = range.map_or(Echo::Nothing, Echo::Range);
+            shield.hear(k, Look { at_ns: now - age * 1_000_000, heading, echo });
+        }
+        let footing = Footing { place: None, sigma_m: 0.0, heading };
+        let wish = Vector::new(wish.0, wish.1);
+        let v = shield.guard(now, wish, &footing, None, push).velocity;
+        let speed = v.norm();
+        prop_assert!(speed <= wish.norm() + 0.13);
+        if speed > 1e-3 {
+            let free = shield.free_way(now, v * (1.0 / speed));
+            prop_assert!(shield.braking().distance(speed) <= free + 1e-3, "{speed} in {free}");
+            // Somebody looks there, and not long ago.
+            let looked = (0..8).any(|k| {
+                let off = control::wrap_angle(v.angle() - heading - k as f32 * FRAC_PI_4).abs();
+                off < 28.2f32.to_radians() && (ages[k] as f32) * 1e-3 <= 2.0 * sweep + 1e-3
+            });
+            prop_assert!(looked);
+        }
+    }
+
+    #[test]
+    fn nonsense_does_no_harm(bits in proptest::collection::vec(any::<u32>(), 12)) {
+        let f = |k: usize| f32::from_bits(bits[k]);
+        let mut shield = eight();
+        shield.set_sweep(f(0));
+        for k in 0..20 {
+            shield.hear(k, Look { at_ns: u64::from(bits[1]), heading: f(2), echo: Echo::Range(f(3 + k % 4)) });
+        }
+        let footing = Footing { place: Vector::new(f(7), f(8)).known(), sigma_m: f(9), heading: f(2) };
+        let walls = DistanceField::new(&door(), 2.0);
+        let v = shield.guard(u64::from(bits[1]), Vector::new(f(10), f(11)), &footing, Some(&walls), true).velocity;
+        prop_assert!(v.is_finite());
+    }
+}

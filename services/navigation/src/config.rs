@@ -1,0 +1,113 @@
+//! What an installer may change about navigation.
+
+use runtime::{ConfigError, Validate, within};
+use serde::Deserialize;
+
+/// `config/navigation.toml`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct NavigationConfig {
+    /// Height of the round above the floor, metres.
+    pub height_m: f32,
+    /// Speed in free space, metres a second; 0: the vehicle's own cruise.
+    pub cruise_m_s: f32,
+    /// Speed where the plan leaves the least clearance (doors), metres a second.
+    pub door_m_s: f32,
+    /// Fastest turn of the wished heading, radians a second.
+    pub turn_rad_s: f32,
+    /// How far ahead on the route the drone aims, metres.
+    pub look_ahead_m: f32,
+    /// Clearance of the plan below which the planned path is followed rather than a valley, metres.
+    pub narrow_m: f32,
+    /// A side sonar that sees something nearer than this to the drone's middle pushes it away, metres.
+    pub push_m: f32,
+    /// How fast it pushes, metres a second for each metre too near.
+    pub push_gain: f32,
+    /// Free way kept between the airframe and what stands ahead, metres.
+    pub stop_gap_m: f32,
+    /// How long to wait for what blocks the way to move on, seconds.
+    pub wait_s: f32,
+    /// Without progress along the route for this long the way counts as blocked, seconds.
+    pub stuck_s: f32,
+    /// Routes tried to one place before it is left out.
+    pub tries: u32,
+    /// Over the pad means nearer than this, metres.
+    pub pad_m: f32,
+    /// Setpoints may be flown for this long, seconds.
+    pub expiry_s: f32,
+    /// A pose older than this is not flown by, seconds.
+    pub pose_age_s: f32,
+    /// Without an echo report for this long the drone stands, seconds.
+    pub ranges_age_s: f32,
+}
+
+impl Default for NavigationConfig {
+    fn default() -> Self {
+        Self {
+            height_m: 1.2,
+            cruise_m_s: 0.0,
+            door_m_s: 0.28,
+            turn_rad_s: 1.0,
+            look_ahead_m: 1.0,
+            narrow_m: 0.7,
+            push_m: 0.55,
+            push_gain: 0.8,
+            stop_gap_m: 0.25,
+            wait_s: 4.0,
+            stuck_s: 12.0,
+            tries: 3,
+            pad_m: 0.12,
+            expiry_s: 0.3,
+            pose_age_s: 0.4,
+            ranges_age_s: 0.5,
+        }
+    }
+}
+
+impl Validate for NavigationConfig {
+    fn validate(&self) -> Result<(), ConfigError> {
+        let check = |field, value: f32, low, high| within(field, f64::from(value), low..=high);
+        check("height_m", self.height_m, 0.5, 2.5)?;
+        if self.cruise_m_s != 0.0 {
+            within("cruise_m_s", f64::from(self.cruise_m_s), 0.1..=1.5).map_err(|_| {
+                ConfigError::range("cruise_m_s", self.cruise_m_s, "0.1..=1.5, or 0 for the vehicle's")
+            })?;
+        }
+        check("door_m_s", self.door_m_s, 0.05, 1.0)?;
+        check("turn_rad_s", self.turn_rad_s, 0.1, 2.0)?;
+        check("look_ahead_m", self.look_ahead_m, 0.4, 1.5)?;
+        check("narrow_m", self.narrow_m, 0.0, 2.0)?;
+        check("push_m", self.push_m, 0.0, 1.0)?;
+        check("push_gain", self.push_gain, 0.0, 3.0)?;
+        check("stop_gap_m", self.stop_gap_m, 0.1, 1.0)?;
+        check("wait_s", self.wait_s, 0.0, 60.0)?;
+        check("stuck_s", self.stuck_s, 3.0, 120.0)?;
+        within("tries", f64::from(self.tries), 1.0..=10.0)?;
+        check("pad_m", self.pad_m, 0.05, 0.5)?;
+        check("expiry_s", self.expiry_s, 0.1, 0.5)?;
+        check("pose_age_s", self.pose_age_s, 0.1, 2.0)?;
+        check("ranges_age_s", self.ranges_age_s, 0.1, 2.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_in_range_and_the_shipped_file_says_the_same() {
+        NavigationConfig::default().validate().unwrap();
+        let text = include_str!("../../../deploy/config/navigation.toml");
+        let shipped: NavigationConfig = runtime::parse_config("navigation.toml", text).unwrap();
+        assert_eq!(shipped, NavigationConfig::default());
+    }
+
+    #[test]
+    fn a_value_out_of_range_and_an_unknown_key_are_refused_by_name() {
+        let parse = |text| runtime::parse_config::<NavigationConfig>("n.toml", text).unwrap_err().to_string();
+        assert!(parse("expiry_s = 5.0").contains("expiry_s"));
+        assert!(parse("cruise_m_s = 9.0").contains("0 for the vehicle's"));
+        assert!(parse("hight_m = 1.0").contains("hight_m"));
+        assert!(parse("wait_s = nan").contains("wait_s"));
+    }
+}

@@ -1,0 +1,297 @@
+//! One decision: from the aim on the route to a velocity and a heading.
+
+use crate::config::NavigationConfig;
+use crate::place::Place;
+use crate::senses::Senses;
+use avoid::swath::free_length;
+use avoid::{Avoider, ConfigError, Decision, Histogram, Reason, Situation, Vfh, VfhConfig, Window, wrap};
+use floorplan::DistanceField;
+use ipc_types::SteeringReason;
+
+/// Certainty at which a cell stands in the way: two readings. A single one may be an outlier (FACTS 8: 1 %).
+pub const STANDS_CERTAINTY: u8 = 16;
+/// Strip looked at ahead is wider than the airframe by this on each side, metres.
+const SWATH_MARGIN_M: f32 = 0.05;
+/// How far the strip reaches, metres.
+const SWATH_M: f32 = 1.6;
+/// Deceleration counted on for stopping, metres a second squared: half of what FACTS 2 allows.
+const BRAKE_M_S2: f32 = 0.8;
+/// Growth of the wished speed, metres a second squared: small tilts keep the attitude filter honest (FACTS 1).
+const SPEED_UP_M_S2: f32 = 0.6;
+/// Echoes older than this do not push, seconds: a sweep of eight one by one is 0.48 s.
+const PUSH_AGE_S: f32 = 0.5;
+/// Fastest push, metres a second.
+const PUSH_MOST_M_S: f32 = 0.2;
+/// Airframe to obstacle below which there is no motion towards it, metres.
+const CLOSE_M: f32 = 0.08;
+/// The speed towards something near falls to nothing over this much more, metres.
+const EASE_M: f32 = 0.15;
+/// Clearance of the plan at and above which the full speed is flown, metres.
+const OPEN_M: f32 = 0.9;
+/// Clearance at which the door speed is flown, metres.
+const DOOR_M: f32 = 0.42;
+/// Position uncertainty that costs no speed, metres, and over how much more it falls to the least share.
+const SURE_M: f32 = 0.12;
+const UNSURE_OVER_M: f32 = 0.25;
+const LEAST_SHARE: f32 = 0.3;
+/// Heading errors up to the first are flown through, from the second on the drone turns on the spot, radians.
+const TURN_FREE_RAD: f32 = 25.0 * core::f32::consts::PI / 180.0;
+const TURN_FIRST_RAD: f32 = 80.0 * core::f32::consts::PI / 180.0;
+/// The line from the drone to its aim keeps at least the airframe and this to mapped walls, metres.
+const CUT_MARGIN_M: f32 = 0.12;
+/// Slowest approach to the end of the route, metres a second.
+const CREEP_M_S: f32 = 0.1;
+
+/// What steering needs to know about the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Craft {
+    /// Propellers included, metres.
+    pub radius_m: f32,
+    /// Speed in free space, metres a second.
+    pub cruise_m_s: f32,
+}
+
+/// What is around at one decision.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene<'a> {
+    /// Now.
+    pub now: u64,
+    /// The drone, now.
+    pub place: Place,
+    /// Where the two layers lie.
+    pub window: Window,
+    /// What the sonars have seen.
+    pub cells: &'a [u8],
+    /// What the plan knows.
+    pub walls: &'a [u8],
+    /// Distance to what is not free on the plan.
+    pub field: &'a DistanceField,
+    /// The newest word of each sonar.
+    pub senses: &'a Senses,
+    /// Since the last decision, seconds.
+    pub dt_s: f32,
+}
+
+/// A decision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Steer {
+    /// Wished velocity, plan frame, metres a second.
+    pub velocity: (f32, f32),
+    /// Wished heading, plan frame, radians.
+    pub heading: f32,
+    /// Why.
+    pub reason: SteeringReason,
+    /// Direction chosen, radians; NaN when stopped.
+    pub direction: f32,
+    /// Direction of the aim, radians; NaN without.
+    pub target: f32,
+    /// Free way ahead, metres.
+    pub free_m: f32,
+    /// How the histogram decided.
+    pub decision: Decision,
+}
+
+/// Remembers what makes one decision follow from the last.
+#[derive(Clone, Debug)]
+pub struct Steering {
+    vfh: Vfh,
+    craft: Craft,
+    heading: f32,
+    speed: f32,
+}
+
+impl Steering {
+    /// For a vehicle.
+    ///
+    /// # Errors
+    /// A vehicle that the histogram cannot be made for.
+    pub fn new(craft: Craft) -> Result<Self, ConfigError> {
+        let vfh = Vfh::new(VfhConfig::flight(craft.radius_m))?;
+        Ok(Self { vfh, craft, heading: f32::NAN, speed: 0.0 })
+    }
+
+    /// Starts afresh: the next wished heading is the present one, the speed grows from nothing.
+    pub fn forget(&mut self) {
+        self.vfh.forget();
+        self.heading = f32::NAN;
+        self.speed = 0.0;
+    }
+
+    /// How far ahead to aim: as far as wished, but no farther than the straight line keeps clear of walls.
+    #[must_use]
+    pub fn look_ahead(
+        &self,
+        config: &NavigationConfig,
+        field: &DistanceField,
+        place: &Place,
+        aim: impl Fn(f32) -> (f32, f32),
+    ) -> f32 {
+        let wanted = self.craft.radius_m + CUT_MARGIN_M;
+        let here = field.distance(place.x, place.y);
+        let mut ahead = config.look_ahead_m;
+        while ahead > 0.35 {
+            let end = aim(ahead);
+            let least = wanted.min(here).min(field.distance(end.0, end.1)) - 0.01;
+            if clearance_between(field, (place.x, place.y), end) >= least {
+                break;
+            }
+            ahead *= 0.8;
+        }
+        ahead
+    }
+
+    /// Chooses velocity and heading towards `aim` (`None`: stand), `remaining_m` before the end of the route.
+    /// The histogram is filled in any case.
+    pub fn step(
+        &mut self,
+        config: &NavigationConfig,
+        scene: &Scene<'_>,
+        aim: Option<(f32, f32)>,
+        remaining_m: f32,
+        histogram: &mut Histogram<'_>,
+    ) -> Steer {
+        let place = &scene.place;
+        if !self.heading.is_finite() {
+            self.heading = place.heading;
+        }
+        let (target_rad, target_m) = aim.map_or((f32::NAN, f32::NAN), |(x, y)| {
+            ((y - place.y).atan2(x - place.x), place.distance((x, y)))
+        });
+        let decision = self.vfh.decide(
+            &Situation {
+                cells: scene.cells,
+                walls: scene.walls,
+                target_rad,
+                target_m,
+                max_speed_m_s: self.craft.cruise_m_s,
+            },
+            histogram,
+        );
+        let mut steer = Steer {
+            velocity: (0.0, 0.0),
+            heading: self.heading,
+            reason: SteeringReason::Holding,
+            direction: f32::NAN,
+            target: target_rad,
+            free_m: SWATH_M,
+            decision,
+        };
+        let Some(aim) = aim else {
+            self.speed = 0.0;
+            return steer;
+        };
+        let clearance = clearance_between(scene.field, (place.x, place.y), aim);
+        let narrow = clearance < config.narrow_m;
+        // Between mapped walls the planned line is known to 3 cm, and the valley is only a few sectors wide:
+        // the line is flown, and what the sonars see still stops it.
+        let (direction, speed, reason) = match decision.direction_rad {
+            _ if narrow => (target_rad, self.craft.cruise_m_s, SteeringReason::TargetSafe),
+            Some(direction) => (direction, decision.speed_m_s, reason_of(decision.reason)),
+            None => (target_rad, 0.0, SteeringReason::Blocked),
+        };
+        let half_width = self.craft.radius_m + SWATH_MARGIN_M;
+        let from = (place.x, place.y);
+        steer.free_m =
+            free_length(scene.cells, &scene.window, from, direction, half_width, SWATH_M, STANDS_CERTAINTY);
+        let gap = steer.free_m - self.craft.radius_m - config.stop_gap_m;
+        steer.reason = if gap <= 0.0 { SteeringReason::Blocked } else { reason };
+        let blocked = steer.reason == SteeringReason::Blocked;
+        if !blocked {
+            steer.direction = direction;
+        }
+
+        self.turn(config, scene.dt_s, direction);
+        steer.heading = self.heading;
+        let mut speed = if blocked { 0.0 } else { speed };
+        speed = speed.min((2.0 * BRAKE_M_S2 * gap.max(0.0)).sqrt());
+        speed = speed.min(self.speed_for(config, clearance));
+        speed = speed.min((0.7 * remaining_m).max(CREEP_M_S));
+        let unsure = ((place.sigma - SURE_M) / UNSURE_OVER_M).clamp(0.0, 1.0 - LEAST_SHARE);
+        speed *= 1.0 - unsure;
+        let off = wrap(direction - place.heading).abs();
+        speed *= 1.0 - ((off - TURN_FREE_RAD) / (TURN_FIRST_RAD - TURN_FREE_RAD)).clamp(0.0, 1.0);
+        speed = speed.min(self.speed + SPEED_UP_M_S2 * scene.dt_s.clamp(0.0, 0.2));
+        self.speed = speed;
+        let wish = (speed * direction.cos(), speed * direction.sin());
+        let (velocity, backing) = self.keep_off(config, scene, wish);
+        steer.velocity = velocity;
+        if backing {
+            steer.reason = SteeringReason::BackingOff;
+        }
+        steer
+    }
+
+    /// Turns the wished heading towards `direction`, no faster than allowed.
+    fn turn(&mut self, config: &NavigationConfig, dt_s: f32, direction: f32) {
+        let most = config.turn_rad_s * dt_s.clamp(0.0, 0.2);
+        let error = wrap(direction - self.heading);
+        if error.is_finite() {
+            self.heading = wrap(self.heading + error.clamp(-most, most));
+        }
+    }
+
+    /// Speed for a clearance of the plan: the door speed in doors, the cruise in the open.
+    fn speed_for(&self, config: &NavigationConfig, clearance: f32) -> f32 {
+        let door = config.door_m_s.min(self.craft.cruise_m_s);
+        let share = ((clearance - DOOR_M) / (OPEN_M - DOOR_M)).clamp(0.0, 1.0);
+        door + share * (self.craft.cruise_m_s - door)
+    }
+
+    /// Pushes away from what side sonars see too near, and takes away the motion towards what is nearer
+    /// still. Also says whether something is inside the safety distance.
+    fn keep_off(&self, config: &NavigationConfig, scene: &Scene<'_>, wish: (f32, f32)) -> ((f32, f32), bool) {
+        let (mut push_x, mut push_y) = (0.0f32, 0.0f32);
+        for (bearing, distance) in scene.senses.near(scene.now, PUSH_AGE_S) {
+            let (sin, cos) = (scene.place.heading + bearing).sin_cos();
+            let near = (config.push_m - distance).max(0.0) * config.push_gain;
+            push_x -= near * cos;
+            push_y -= near * sin;
+        }
+        let push = push_x.hypot(push_y);
+        if push > PUSH_MOST_M_S {
+            (push_x, push_y) = (push_x * PUSH_MOST_M_S / push, push_y * PUSH_MOST_M_S / push);
+        }
+        let (mut vx, mut vy) = (wish.0 + push_x, wish.1 + push_y);
+        let mut backing = false;
+        for (bearing, distance) in scene.senses.near(scene.now, PUSH_AGE_S) {
+            let (sin, cos) = (scene.place.heading + bearing).sin_cos();
+            let room = distance - self.craft.radius_m - CLOSE_M;
+            backing |= room < 0.0;
+            let towards = vx * cos + vy * sin;
+            let most = self.craft.cruise_m_s * (room / EASE_M).clamp(0.0, 1.0);
+            if towards > most {
+                vx -= (towards - most) * cos;
+                vy -= (towards - most) * sin;
+            }
+        }
+        let speed = vx.hypot(vy);
+        if speed > self.craft.cruise_m_s {
+            (vx, vy) = (vx * self.craft.cruise_m_s / speed, vy * self.craft.cruise_m_s / speed);
+        }
+        ((vx, vy), backing)
+    }
+}
+
+fn reason_of(reason: Reason) -> SteeringReason {
+    match reason {
+        Reason::Holding => SteeringReason::Holding,
+        Reason::TargetSafe => SteeringReason::TargetSafe,
+        Reason::NarrowValley => SteeringReason::NarrowValley,
+        Reason::WideValley => SteeringReason::WideValley,
+        Reason::Blocked => SteeringReason::Blocked,
+    }
+}
+
+/// Least clearance of the plan along a straight line, metres, looked at every 10 cm.
+#[must_use]
+pub fn clearance_between(field: &DistanceField, a: (f32, f32), b: (f32, f32)) -> f32 {
+    let length = (b.0 - a.0).hypot(b.1 - a.1);
+    // A line longer than a plan is broken input; the samples stay bounded.
+    let steps = (length / 0.1).ceil().clamp(1.0, 200.0) as usize;
+    (0..=steps)
+        .map(|i| {
+            let t = i as f32 / steps as f32;
+            field.distance(a.0 + t * (b.0 - a.0), a.1 + t * (b.1 - a.1))
+        })
+        .fold(f32::INFINITY, f32::min)
+}
