@@ -24,6 +24,7 @@ mod options;
 mod place;
 pub mod protocol;
 mod shared;
+mod signals;
 mod supervisor;
 
 pub use client::{Client, ClientError};

@@ -1,5 +1,7 @@
 //! The loop: what has happened, what is due, what is asked.
 
+mod requests;
+
 use crate::child::{Child, Surroundings};
 use crate::control::Control;
 use crate::error::while_doing;
@@ -7,16 +9,14 @@ use crate::life::{Action, Life};
 use crate::log::Log;
 use crate::notify::NotifySocket;
 use crate::place::Place;
-use crate::protocol::{Request, Response};
 use crate::shared::SharedMemory;
+use crate::signals::SignalPipe;
 use crate::{Options, SupervisorError, default_run_dir};
-use manifest::{Criticality, Manifest};
+use manifest::Manifest;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::Signal;
 use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
-use signal_hook::{SigId, low_level};
-use std::io::{Read, Write};
-use std::os::unix::net::UnixStream;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -30,8 +30,6 @@ const OVERSLEPT: Duration = Duration::from_millis(200);
 const LAND_AGAIN: Duration = Duration::from_secs(1);
 /// Patience with each service when there is a hurry.
 const HURRY: Duration = Duration::from_millis(500);
-/// Requests of one connection answered in one turn: nobody keeps the loop from its services.
-const REQUESTS: usize = 8;
 /// Ahead of every service: a restart must not wait for those that still run.
 const NICENESS: i32 = -19;
 
@@ -49,46 +47,6 @@ impl Phase {
             Self::Running => "running",
             Self::Landing { .. } => "landing",
             Self::Stopping { .. } => "stopping",
-        }
-    }
-}
-
-/// Signals as bytes in a socket; unregistered when dropped.
-struct SignalPipe {
-    read: UnixStream,
-    ids: Vec<SigId>,
-}
-
-impl SignalPipe {
-    fn new(signals: &[i32]) -> Result<Self, SupervisorError> {
-        let (read, write) = UnixStream::pair().map_err(while_doing("signal pipe"))?;
-        read.set_nonblocking(true).map_err(while_doing("signal pipe"))?;
-        let mut pipe = Self { read, ids: Vec::new() };
-        for signal in signals {
-            let write = write.try_clone().map_err(while_doing("signal pipe"))?;
-            pipe.ids.push(low_level::pipe::register(*signal, write).map_err(while_doing("signal handler"))?);
-        }
-        Ok(pipe)
-    }
-
-    /// How many signals came since the last look.
-    fn take(&mut self) -> usize {
-        let mut buffer = [0_u8; 64];
-        let mut count = 0;
-        while let Ok(n) = self.read.read(&mut buffer) {
-            if n == 0 {
-                break;
-            }
-            count += n;
-        }
-        count
-    }
-}
-
-impl Drop for SignalPipe {
-    fn drop(&mut self) {
-        for id in self.ids.drain(..) {
-            low_level::unregister(id);
         }
     }
 }
@@ -268,7 +226,13 @@ impl<S: SharedMemory> Supervisor<S> {
             let name = child.entry.name.clone();
             if let Some(end) = child.reap(now, seconds, |line| show(echo, &name, line)) {
                 let word = child.life.word();
-                child.retained = self.shared.recover(&name);
+                for topic in self.shared.recover(&name) {
+                    // What was offered before and not replaced is still on offer: a service that dies while it
+                    // starts finds it again.
+                    if !child.retained.contains(&topic) {
+                        child.retained.push(topic);
+                    }
+                }
                 news.push(format!("{name}: {end}; {word}"));
             }
         }
@@ -356,103 +320,6 @@ impl<S: SharedMemory> Supervisor<S> {
             }
         }
         self.children.iter().all(|c| c.pid().is_none())
-    }
-
-    /// Answers requests.
-    fn serve(&mut self, now: Instant) {
-        self.control.accept();
-        for index in 0..self.control.connections.len() {
-            for _ in 0..REQUESTS {
-                let Some(request) = self.control.next_request(index) else { break };
-                let response = match request {
-                    Ok(request) => self.answer(request, now),
-                    Err(reason) => Response::Refused { reason },
-                };
-                self.control.answer(index, &response);
-            }
-        }
-        self.control.flush();
-    }
-
-    fn answer(&mut self, request: Request, now: Instant) -> Response {
-        let done = |text: String| Response::Done { text };
-        match request {
-            Request::Ping => Response::Pong {
-                pid: std::process::id(),
-                system: self.manifest.system.name.clone(),
-                manifests: self.around.manifests.split(':').map(str::to_owned).collect(),
-                simulated: self.manifest.system.simulated,
-            },
-            Request::Ps => Response::Services {
-                airborne: self.shared.airborne(),
-                phase: self.phase.word().to_owned(),
-                services: self.children.iter().map(|child| child.row(now)).collect(),
-            },
-            Request::Logs { service, lines } if service == "supervisor" => {
-                Response::Logs { lines: self.own_log.tail(lines) }
-            }
-            Request::Logs { service, lines } => {
-                match self.children.iter().find(|c| c.entry.name == service) {
-                    Some(child) => Response::Logs { lines: child.log.tail(lines) },
-                    None => self.no_such(&service),
-                }
-            }
-            Request::Stop { now: at_once } => {
-                if self.phase == Phase::Running || at_once {
-                    self.stop_wanted(at_once, now);
-                }
-                done(self.phase.word().to_owned())
-            }
-            Request::Restart { service, in_flight } => {
-                self.change(&service, in_flight, now, "restart", |life| life.restart(now))
-            }
-            Request::Hold { service, in_flight } => {
-                self.change(&service, in_flight, now, "hold", |life| life.hold(now))
-            }
-            Request::Release { service } => {
-                self.change(&service, true, now, "release", |life| life.release(now).map(|()| None))
-            }
-        }
-    }
-
-    fn no_such(&self, service: &str) -> Response {
-        let names: Vec<&str> = self.children.iter().map(|c| c.entry.name.as_str()).collect();
-        Response::Refused { reason: format!("there is no service {service}; there are {}", names.join(", ")) }
-    }
-
-    /// Changes the life of a service by order of a human, unless that would drop the aircraft.
-    fn change(
-        &mut self,
-        service: &str,
-        in_flight: bool,
-        now: Instant,
-        verb: &str,
-        how: impl FnOnce(&mut Life) -> Result<Option<Action>, &'static str>,
-    ) -> Response {
-        let refused = |reason: String| Response::Refused { reason };
-        if self.phase != Phase::Running {
-            return refused(format!("the system is {}", self.phase.word()));
-        }
-        let airborne = self.shared.airborne();
-        let Some(child) = self.children.iter_mut().find(|c| c.entry.name == service) else {
-            return self.no_such(service);
-        };
-        if airborne && !in_flight && child.entry.criticality == Criticality::Flight {
-            return refused(format!(
-                "{service} keeps the aircraft in the air: land first, or {verb} it with --in-flight"
-            ));
-        }
-        match how(&mut child.life) {
-            Ok(action) => {
-                if action == Some(Action::Terminate) {
-                    child.signal(Signal::TERM);
-                }
-                self.say(&format!("{service}: {verb} by request"));
-                self.act(now);
-                Response::Done { text: format!("{service}: {verb}") }
-            }
-            Err(why) => refused(format!("{service}: {why}")),
-        }
     }
 
     fn seconds(&self, now: Instant) -> f64 {

@@ -9,7 +9,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 use supervisor::{ClientError, NoSharedMemory, Options, SupervisorError};
-use system::{LONG, System, exists, kill, wait_until};
+use system::{LONG, System, alive, exists, kill, wait_until};
 
 #[test]
 fn services_start_by_criticality_and_report() {
@@ -39,7 +39,7 @@ fn a_killed_service_is_reaped_and_comes_back() {
     }
     // The keeper's offer reaches the next start.
     let log = system.client().logs("a", 100).unwrap();
-    assert!(log.iter().any(|line| line.ends_with("work: start 0, kept ")), "{log:?}");
+    assert!(log.iter().any(|line| line.ends_with("work: start 0, kept")), "{log:?}");
     assert!(log.iter().any(|line| line.ends_with("work: start 5, kept a/state")), "{log:?}");
 }
 
@@ -254,11 +254,11 @@ fn services_die_with_their_supervisor_and_the_next_one_clears_up() {
     let shell = system.row("shell").pid.unwrap();
     system.signal(Signal::KILL);
     let _ = system.ended();
-    wait_until("the service has died with it", || !exists(worker));
-    assert!(exists(shell), "a shell does not ask to die with its parent");
+    wait_until("the service has died with it", || !alive(worker));
+    assert!(alive(shell), "a shell does not ask to die with its parent");
     system.start();
     system.wait_running("a");
-    assert!(!exists(shell), "so the next supervisor ended it");
+    assert!(!alive(shell), "so the next supervisor ended it");
 }
 
 #[test]

@@ -1,3 +1,5 @@
 //! The flow process.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    runtime::main::<flow::Flow>(flow::SerialPorts)
+}

@@ -38,8 +38,10 @@ impl Place {
     #[must_use]
     pub fn of(pose: &Pose, last: Option<&Self>) -> Option<Self> {
         let state = u8::try_from(pose.state).ok().and_then(LocalizationState::from_code)?;
+        let variances = [pose.variance_x_m2, pose.covariance_xy_m2, pose.variance_y_m2];
         let finite = [pose.heading_rad, pose.velocity_x_m_s, pose.velocity_y_m_s, pose.sigma_m()]
             .iter()
+            .chain(&variances)
             .all(|v| v.is_finite());
         let near = |v: f32| v.is_finite() && v.abs() <= FARTHEST_M;
         let fast = pose.velocity_x_m_s.hypot(pose.velocity_y_m_s) > 20.0;

@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn an_echo_from_behind_a_wall_is_no_obstacle() {
         let mut senses = Senses::default();
-        let beam = senses.take(&reading(0.0, 1.9), &place(1.2, 0.2), &plan()).unwrap();
+        let beam = senses.take(&reading(0.0, 1.9), &place(2.0, 0.2), &plan()).unwrap();
         assert_eq!(beam.echo, Echo::Mapped(1.9));
     }
 

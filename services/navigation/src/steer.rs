@@ -3,6 +3,7 @@
 use crate::config::NavigationConfig;
 use crate::place::Place;
 use crate::senses::Senses;
+use crate::track::Track;
 use avoid::swath::free_length;
 use avoid::{Avoider, ConfigError, Decision, Histogram, Reason, Situation, Vfh, VfhConfig, Window, wrap};
 use floorplan::DistanceField;
@@ -37,8 +38,20 @@ const LEAST_SHARE: f32 = 0.3;
 /// Heading errors up to the first are flown through, from the second on the drone turns on the spot, radians.
 const TURN_FREE_RAD: f32 = 25.0 * core::f32::consts::PI / 180.0;
 const TURN_FIRST_RAD: f32 = 80.0 * core::f32::consts::PI / 180.0;
-/// The line from the drone to its aim keeps at least the airframe and this to mapped walls, metres.
-const CUT_MARGIN_M: f32 = 0.12;
+/// The straight line to the aim may pass this much nearer to walls than the route does, metres.
+const CUT_LOSS_M: f32 = 0.03;
+/// Farther than this from walls corners are cut as they come, metres.
+const CUT_FREELY_M: f32 = 0.7;
+/// The aim is never nearer than about this, metres: the direction would jitter with the estimate.
+const SHORTEST_AHEAD_M: f32 = 0.35;
+/// Places of the route between the drone and its aim that are asked for their clearance.
+const AIM_SAMPLES: usize = 8;
+/// Nearer to the route than this the drone counts as on it, metres.
+const ON_ROUTE_M: f32 = 0.25;
+/// Once blocked, the way must be free for this much more, metres.
+const FREE_AGAIN_M: f32 = 0.2;
+/// Less than this much way before the stop is not worth going, metres.
+const WORTH_M: f32 = 0.05;
 /// Slowest approach to the end of the route, metres a second.
 const CREEP_M_S: f32 = 0.1;
 
@@ -49,6 +62,23 @@ pub struct Craft {
     pub radius_m: f32,
     /// Speed in free space, metres a second.
     pub cruise_m_s: f32,
+}
+
+/// What the route asks for at one decision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// Place to fly at, plan frame, metres.
+    pub x: f32,
+    /// Place to fly at, plan frame, metres.
+    pub y: f32,
+    /// Least clearance of the plan on the way there, metres.
+    pub clearance_m: f32,
+    /// Least clearance of the route between here and there, metres.
+    pub route_m: f32,
+    /// Distance of the drone from the route, metres.
+    pub aside_m: f32,
+    /// What is left of the route, metres.
+    pub remaining_m: f32,
 }
 
 /// What is around at one decision.
@@ -98,6 +128,7 @@ pub struct Steering {
     craft: Craft,
     heading: f32,
     speed: f32,
+    blocked: bool,
 }
 
 impl Steering {
@@ -107,7 +138,7 @@ impl Steering {
     /// A vehicle that the histogram cannot be made for.
     pub fn new(craft: Craft) -> Result<Self, ConfigError> {
         let vfh = Vfh::new(VfhConfig::flight(craft.radius_m))?;
-        Ok(Self { vfh, craft, heading: f32::NAN, speed: 0.0 })
+        Ok(Self { vfh, craft, heading: f32::NAN, speed: 0.0, blocked: false })
     }
 
     /// Starts afresh: the next wished heading is the present one, the speed grows from nothing.
@@ -115,47 +146,58 @@ impl Steering {
         self.vfh.forget();
         self.heading = f32::NAN;
         self.speed = 0.0;
+        self.blocked = false;
     }
 
-    /// How far ahead to aim: as far as wished, but no farther than the straight line keeps clear of walls.
+    /// The aim on the route: as far ahead as wished, but no farther than the straight line there keeps
+    /// about the clearance of the route itself. `None` without a route.
     #[must_use]
-    pub fn look_ahead(
+    pub fn aim(
         &self,
         config: &NavigationConfig,
         field: &DistanceField,
         place: &Place,
-        aim: impl Fn(f32) -> (f32, f32),
-    ) -> f32 {
-        let wanted = self.craft.radius_m + CUT_MARGIN_M;
+        track: &Track,
+    ) -> Option<Aim> {
+        track.end()?;
         let here = field.distance(place.x, place.y);
         let mut ahead = config.look_ahead_m;
-        while ahead > 0.35 {
-            let end = aim(ahead);
-            let least = wanted.min(here).min(field.distance(end.0, end.1)) - 0.01;
-            if clearance_between(field, (place.x, place.y), end) >= least {
-                break;
+        loop {
+            let route = (0..=AIM_SAMPLES)
+                .map(|i| track.aim(ahead * i as f32 / AIM_SAMPLES as f32))
+                .map(|(x, y)| field.distance(x, y))
+                .fold(f32::INFINITY, f32::min);
+            let (x, y) = track.aim(ahead);
+            let line = clearance_between(field, (place.x, place.y), (x, y));
+            if ahead < SHORTEST_AHEAD_M || line >= route.min(here).min(CUT_FREELY_M) - CUT_LOSS_M {
+                let remaining_m = track.remaining();
+                return Some(Aim {
+                    x,
+                    y,
+                    clearance_m: route.min(line),
+                    route_m: route,
+                    aside_m: track.aside(),
+                    remaining_m,
+                });
             }
             ahead *= 0.8;
         }
-        ahead
     }
 
-    /// Chooses velocity and heading towards `aim` (`None`: stand), `remaining_m` before the end of the route.
-    /// The histogram is filled in any case.
+    /// Chooses velocity and heading towards the aim (`None`: stand). The histogram is filled in any case.
     pub fn step(
         &mut self,
         config: &NavigationConfig,
         scene: &Scene<'_>,
-        aim: Option<(f32, f32)>,
-        remaining_m: f32,
+        aim: Option<Aim>,
         histogram: &mut Histogram<'_>,
     ) -> Steer {
         let place = &scene.place;
         if !self.heading.is_finite() {
             self.heading = place.heading;
         }
-        let (target_rad, target_m) = aim.map_or((f32::NAN, f32::NAN), |(x, y)| {
-            ((y - place.y).atan2(x - place.x), place.distance((x, y)))
+        let (target_rad, target_m) = aim.map_or((f32::NAN, f32::NAN), |aim| {
+            ((aim.y - place.y).atan2(aim.x - place.x), place.distance((aim.x, aim.y)))
         });
         let decision = self.vfh.decide(
             &Situation {
@@ -180,32 +222,38 @@ impl Steering {
             self.speed = 0.0;
             return steer;
         };
-        let clearance = clearance_between(scene.field, (place.x, place.y), aim);
-        let narrow = clearance < config.narrow_m;
-        // Between mapped walls the planned line is known to 3 cm, and the valley is only a few sectors wide:
-        // the line is flown, and what the sonars see still stops it.
-        let (direction, speed, reason) = match decision.direction_rad {
-            _ if narrow => (target_rad, self.craft.cruise_m_s, SteeringReason::TargetSafe),
-            Some(direction) => (direction, decision.speed_m_s, reason_of(decision.reason)),
-            None => (target_rad, 0.0, SteeringReason::Blocked),
+        let free = |direction: f32| {
+            let half_width = self.craft.radius_m + SWATH_MARGIN_M;
+            let from = (place.x, place.y);
+            free_length(scene.cells, &scene.window, from, direction, half_width, SWATH_M, STANDS_CERTAINTY)
         };
-        let half_width = self.craft.radius_m + SWATH_MARGIN_M;
-        let from = (place.x, place.y);
-        steer.free_m =
-            free_length(scene.cells, &scene.window, from, direction, half_width, SWATH_M, STANDS_CERTAINTY);
-        let gap = steer.free_m - self.craft.radius_m - config.stop_gap_m;
-        steer.reason = if gap <= 0.0 { SteeringReason::Blocked } else { reason };
-        let blocked = steer.reason == SteeringReason::Blocked;
-        if !blocked {
+        let reserve = self.craft.radius_m + config.stop_gap_m;
+        let wanted = if self.blocked { FREE_AGAIN_M } else { WORTH_M };
+        // Between mapped walls the planned line is known to 3 cm, and the valley is only a few sectors wide:
+        // the line is flown while nothing stands on it.
+        let narrow = aim.route_m < config.narrow_m && aim.aside_m < ON_ROUTE_M;
+        let on_line = free(target_rad);
+        let (direction, speed, reason, free_m) = match decision.direction_rad {
+            _ if narrow && on_line - reserve > wanted => {
+                (target_rad, self.craft.cruise_m_s, SteeringReason::TargetSafe, on_line)
+            }
+            Some(direction) => (direction, decision.speed_m_s, reason_of(decision.reason), free(direction)),
+            None => (target_rad, 0.0, SteeringReason::Blocked, on_line),
+        };
+        steer.free_m = free_m;
+        let gap = free_m - reserve;
+        self.blocked = gap <= wanted || reason == SteeringReason::Blocked;
+        steer.reason = if self.blocked { SteeringReason::Blocked } else { reason };
+        if !self.blocked {
             steer.direction = direction;
         }
 
         self.turn(config, scene.dt_s, direction);
         steer.heading = self.heading;
-        let mut speed = if blocked { 0.0 } else { speed };
+        let mut speed = if self.blocked { 0.0 } else { speed };
         speed = speed.min((2.0 * BRAKE_M_S2 * gap.max(0.0)).sqrt());
-        speed = speed.min(self.speed_for(config, clearance));
-        speed = speed.min((0.7 * remaining_m).max(CREEP_M_S));
+        speed = speed.min(self.speed_for(config, aim.clearance_m));
+        speed = speed.min((0.7 * aim.remaining_m).max(CREEP_M_S));
         let unsure = ((place.sigma - SURE_M) / UNSURE_OVER_M).clamp(0.0, 1.0 - LEAST_SHARE);
         speed *= 1.0 - unsure;
         let off = wrap(direction - place.heading).abs();

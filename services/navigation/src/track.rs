@@ -157,7 +157,7 @@ impl Track {
     fn reversal_after(&self, along: f32) -> Option<f32> {
         self.points
             .windows(3)
-            .zip(&self.lengths[1..])
+            .zip(self.lengths.iter().skip(1))
             .filter(|(_, length)| **length > along)
             .find(|(corner, _)| {
                 let into = (corner[1].1 - corner[0].1).atan2(corner[1].0 - corner[0].0);

@@ -20,6 +20,7 @@ mod device;
 mod error;
 mod journal;
 mod lockstep;
+mod notify;
 mod port;
 mod process;
 mod service;

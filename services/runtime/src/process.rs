@@ -4,10 +4,10 @@ use crate::config::parse_config;
 use crate::device::Devices;
 use crate::port::{BusKind, StepContext};
 use crate::shm::{RunDir, SharedNode};
+use crate::notify::Notifier;
 use crate::{Cache, Input, Output, Ports, Service, Start, StartError, fnv};
 use ipc_types::{Health, MAX_PORTS, Message, Text, Trace};
 use manifest::Manifest;
-use sd_notify::NotifyState;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
@@ -41,11 +41,12 @@ pub fn monotonic_ns() -> u64 {
 /// Runs a service as this process until SIGTERM; the whole `main` of a service.
 pub fn main<S: Service>(devices: impl Devices + 'static) -> ExitCode {
     tracing_subscriber::fmt().with_writer(std::io::stderr).with_target(false).without_time().init();
-    match run::<S>(Box::new(devices)) {
+    let notifier = Notifier::from_environment();
+    match run::<S>(Box::new(devices), &notifier) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             tracing::error!("{}: {error}", S::NAME);
-            let _ = sd_notify::notify(&[NotifyState::Status(&format!("cannot start: {error}"))]);
+            notifier.say(&format!("STATUS=cannot start: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -104,7 +105,7 @@ pub fn known_topics() -> Vec<&'static str> {
     names.0
 }
 
-fn run<S: Service>(devices: Box<dyn Devices>) -> Result<(), StartError> {
+fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(), StartError> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(StartError::invalid)?;
@@ -165,7 +166,7 @@ fn run<S: Service>(devices: Box<dyn Devices>) -> Result<(), StartError> {
     let mut journal = Journal::open(&mut ports, S::NAME)?;
     let mut service = S::start(config, &mut ports, &start)?;
     journal.begin(&start, config_hash, &context);
-    let _ = sd_notify::notify(&[NotifyState::Ready]);
+    notifier.say("READY=1");
     tracing::info!("{} ready (start {incarnation})", S::NAME);
 
     let mut next_tick = monotonic_ns();
@@ -199,12 +200,12 @@ fn run<S: Service>(devices: Box<dyn Devices>) -> Result<(), StartError> {
             next_heartbeat = now + heartbeat.as_nanos() as u64;
             let mut text = Text::<96>::default();
             service.status(&mut text);
-            let _ = sd_notify::notify(&[NotifyState::Watchdog, NotifyState::Status(text.as_str())]);
+            notifier.beat(&text);
             journal.report(&text, service.refused(), &ports);
             node.serve_late_joiners();
         }
     }
-    let _ = sd_notify::notify(&[NotifyState::Stopping]);
+    notifier.say("STOPPING=1");
     tracing::info!("{} stopped", S::NAME);
     Ok(())
 }

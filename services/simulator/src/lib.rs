@@ -1,1 +1,15 @@
-//! The simulator service.
+//! The simulator service: one flight of `airframe` behind the ports of real devices.
+//!
+//! `flight` and `flow` open its serial lines as they open real ports (a pseudo-terminal each, [`PtyDevices`];
+//! in lockstep, memory); `sonar` triggers pings and hears echoes over `sim/ping` and `sim/echo`. The truth
+//! goes out on `sim/truth`, for scorers.
+
+mod config;
+mod pty;
+mod service;
+mod world;
+
+pub use config::Config;
+pub use pty::PtyDevices;
+pub use service::Simulator;
+pub use world::build_world;

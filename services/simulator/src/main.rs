@@ -1,3 +1,5 @@
 //! The simulator process.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    runtime::main::<simulator::Simulator>(simulator::PtyDevices)
+}

@@ -1,3 +1,5 @@
 //! The sonar process.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    runtime::main::<sonar::Sonar>(runtime::NoDevices)
+}

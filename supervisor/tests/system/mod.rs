@@ -3,6 +3,8 @@
 //! The test executable plays all the parts. Run with `--ignored --exact system::supervisor_process` it is a
 //! supervisor, with `system::child_process` a service.
 
+#![allow(dead_code, reason = "every test file uses its part")]
+
 use rustix::process::{Pid, Signal, kill_process};
 use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
@@ -234,4 +236,10 @@ pub(crate) fn kill(pid: u32, signal: Signal) {
 /// Whether there is such a process, zombies included.
 pub(crate) fn exists(pid: u32) -> bool {
     Path::new(&format!("/proc/{pid}")).exists()
+}
+
+/// Whether a process runs; one that has ended and that nobody has reaped yet does not.
+pub(crate) fn alive(pid: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    stat.rsplit_once(") ").is_some_and(|(_, rest)| !rest.starts_with(['Z', 'X']))
 }

@@ -3,10 +3,13 @@
 
 pub mod acoustics;
 pub mod clutter;
-pub mod people;
-pub mod world;
 pub mod controller;
+pub mod people;
+pub mod picture;
+pub mod score;
+pub mod simulation;
 pub mod vehicle;
+pub mod world;
 
 #[cfg(test)]
 mod testing;

@@ -75,11 +75,7 @@ impl Person {
         if (self.forward && self.target + 1 >= n) || (!self.forward && self.target == 0) {
             self.forward = !self.forward;
         }
-        self.target = if self.forward {
-            (self.target + 1).min(n - 1)
-        } else {
-            self.target.saturating_sub(1)
-        };
+        self.target = if self.forward { (self.target + 1).min(n - 1) } else { self.target.saturating_sub(1) };
     }
 
     fn turn_round(&mut self) {

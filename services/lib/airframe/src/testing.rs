@@ -2,9 +2,6 @@
 
 /// The deployed vehicle file, so that tests fly what flies.
 pub(crate) fn watchman() -> manifest::Vehicle {
-    manifest::Vehicle::parse(
-        "watchman.toml",
-        include_str!("../../../../deploy/vehicles/watchman.toml"),
-    )
-    .expect("the deployed vehicle file parses")
+    manifest::Vehicle::parse("watchman.toml", include_str!("../../../../deploy/vehicles/watchman.toml"))
+        .expect("the deployed vehicle file parses")
 }

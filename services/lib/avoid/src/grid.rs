@@ -97,12 +97,13 @@ pub struct GridRules {
 pub const UNITS_PER_READING: u8 = 8;
 
 impl Default for GridRules {
-    /// The `flight` configuration: 15 readings saturate, a full cell is forgotten in 30 s, an echo from behind
-    /// takes three quarters of a reading away.
+    /// The `flight` configuration: six readings saturate, so that what moved on is cleared by a handful of
+    /// pings (about 2 s at 4 Hz a sensor); a full cell is forgotten in 12 s; an echo from behind takes three
+    /// quarters of a reading away.
     fn default() -> Self {
         Self {
             reading: UNITS_PER_READING,
-            most: 15 * UNITS_PER_READING,
+            most: 6 * UNITS_PER_READING,
             clear_echo: 6,
             clear_silence: 1,
             decay_per_s: 4.0,

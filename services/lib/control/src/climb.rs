@@ -11,13 +11,13 @@ pub struct ClimbConfig {
     /// Climb rate for each metre of error, 1/s: under half of `rate_gain_per_s`.
     pub height_gain_per_s: f32,
     /// Acceleration for each m/s of error, 1/s. Motors (0.06 s), link (0.04 s) and the observer leave about
-    /// 50 degrees of phase at 2.5, and 35 when the thrust answers 1.5 times as strongly as modelled.
+    /// 50 degrees of phase at 3, and 30 when the thrust answers 1.5 times as strongly as modelled.
     pub rate_gain_per_s: f32,
     /// Most climb, m/s.
     pub max_climb_m_s: f32,
     /// Most descent, m/s.
     pub max_descent_m_s: f32,
-    /// Most commanded vertical acceleration, m/s2.
+    /// Most commanded acceleration downwards, m/s2; upwards three times this, to end a fall in time.
     pub max_acceleration_m_s2: f32,
     /// Least and most throttle in the air, as multiples of the learned collective.
     pub collective_range: [f32; 2],
@@ -30,8 +30,8 @@ pub struct ClimbConfig {
 impl Default for ClimbConfig {
     fn default() -> Self {
         Self {
-            height_gain_per_s: 1.1,
-            rate_gain_per_s: 2.5,
+            height_gain_per_s: 1.2,
+            rate_gain_per_s: 3.0,
             max_climb_m_s: 0.5,
             max_descent_m_s: 0.4,
             max_acceleration_m_s2: 2.0,
@@ -69,6 +69,8 @@ pub enum VerticalWish {
 
 /// Throttle that carries nothing: the idle of the controller.
 pub(crate) const IDLE_US: f32 = 1000.0;
+/// Drag along the rotor axis, 1/s: small craft lose about a tenth of their climb rate a second.
+const DRAG_PER_S: f32 = 0.1;
 /// Bounds of a hover throttle that is believed. An aircraft outside would climb like a rocket or hardly fly.
 const HOVER_RANGE_US: [f32; 2] = [1120.0, 1800.0];
 
@@ -123,10 +125,10 @@ impl ClimbController {
 
     /// The vertical acceleration that the throttle of the last steps should give, m/s2: thrust goes with the
     /// square of the throttle above idle and tilts with the body.
-    pub fn expected_acceleration(&mut self, dt: f32, tilt_rad: f32) -> f32 {
+    pub fn expected_acceleration(&mut self, dt: f32, tilt_rad: f32, climb_m_s: f32) -> f32 {
         self.lagged_us += (self.throttle_us - self.lagged_us) * (dt / (self.config.motor_lag_s + dt));
         let load = square((self.lagged_us - IDLE_US) / (self.hover_us - IDLE_US));
-        GRAVITY_M_S2 * (load * tilt_rad.clamp(-1.0, 1.0).cos() - 1.0)
+        GRAVITY_M_S2 * (load * tilt_rad.clamp(-1.0, 1.0).cos() - 1.0) - DRAG_PER_S * climb_m_s
     }
 
     /// The throttle for the next step, microseconds. Learns the hover throttle when `learn`.
@@ -145,7 +147,7 @@ impl ClimbController {
         };
         let climb = if climb.is_finite() { climb.clamp(-c.max_descent_m_s, c.max_climb_m_s) } else { 0.0 };
         let wanted = (c.rate_gain_per_s * (climb - estimate.climb_m_s()))
-            .clamp(-c.max_acceleration_m_s2, c.max_acceleration_m_s2);
+            .clamp(-c.max_acceleration_m_s2, 3.0 * c.max_acceleration_m_s2);
         let load = (1.0 + (wanted - estimate.bias_m_s2()) / GRAVITY_M_S2) / tilt_rad.clamp(-0.6, 0.6).cos();
         let low = c.collective_range[0];
         let multiple = load.max(low * low).sqrt();

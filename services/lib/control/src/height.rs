@@ -12,8 +12,8 @@ use crate::held::seconds;
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct HeightConfig {
-    /// Bandwidth of the observer, rad/s: three equal poles. 4 averages 3-10 mm of noise at 16.7 Hz to under
-    /// 2 cm/s of climb rate and still sees a wrong hover throttle within half a second.
+    /// Bandwidth of the observer, rad/s: three equal poles. 5 averages 3-10 mm of noise at 16.7 Hz to under
+    /// 3 cm/s of climb rate and still sees a wrong hover throttle within half a second.
     pub bandwidth_rad_s: f32,
     /// Disagreement beyond which a reading is a step or a spike, metres: seven times the worst noise.
     pub gate_m: f32,
@@ -32,7 +32,7 @@ pub struct HeightConfig {
 impl Default for HeightConfig {
     fn default() -> Self {
         Self {
-            bandwidth_rad_s: 4.0,
+            bandwidth_rad_s: 5.0,
             gate_m: 0.07,
             gate_growth_m_s: 0.3,
             step_readings: 3,

@@ -39,7 +39,7 @@ pub struct ShieldConfig {
     pub plan_margin_m: f32,
     /// Speed at which the drone may still go where only a doubtful pose, and no echo, sees a wall, m/s.
     pub creep_m_s: f32,
-    /// Most of the disc that the pose may put inside a wall of the plan while the sonars say free, metres.
+    /// Most of the disc that an unsure pose may put inside a wall of the plan while the sonars say free, metres.
     pub plan_overlap_m: f32,
 }
 
@@ -294,7 +294,8 @@ impl Shield {
         let (Some(walls), Some(place)) = (walls, footing.place) else { return speed };
         let sigma = if footing.sigma_m.is_finite() { footing.sigma_m.clamp(0.0, 0.08) } else { 0.08 };
         let soft = Self::plan_way(walls, place, direction, self.radius_m + c.plan_margin_m + sigma);
-        let hard = Self::plan_way(walls, place, direction, (self.radius_m - c.plan_overlap_m).max(0.05));
+        let overlap = (sigma - c.plan_margin_m).clamp(-c.plan_margin_m, c.plan_overlap_m);
+        let hard = Self::plan_way(walls, place, direction, (self.radius_m - overlap).max(0.05));
         speed.min(braking.speed(soft).max(c.creep_m_s.min(braking.speed(hard))))
     }
 

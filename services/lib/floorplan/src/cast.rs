@@ -74,6 +74,7 @@ impl Plan {
         let leaps = self.leaps();
         let mut travelled = 0.0_f32;
         loop {
+            // `travelled` never shrinks: after a leap, rounding may put a border just behind the ray.
             let mut leap = 0;
             if ix >= 0 && iy >= 0 && ix < width && iy < height {
                 let index = (iy * width + ix) as usize;
@@ -90,16 +91,15 @@ impl Plan {
                 (ix, iy) = ((gx + travelled * cos).floor() as i32, (gy + travelled * sin).floor() as i32);
                 (next_x, next_y) = (along_x.border(ix), along_y.border(iy));
             } else if next_x < next_y {
-                travelled = next_x;
+                travelled = travelled.max(next_x);
                 ix += along_x.step;
                 next_x = along_x.border(ix);
             } else {
-                travelled = next_y;
+                travelled = travelled.max(next_y);
                 iy += along_y.step;
                 next_y = along_y.border(iy);
             }
-            // Written so that a direction without length, which never arrives, ends too.
-            if !(travelled <= end) {
+            if travelled > end {
                 return None;
             }
         }

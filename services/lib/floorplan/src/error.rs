@@ -107,7 +107,7 @@ impl PlanError {
         Self::Syntax { file: file.to_owned(), reason }
     }
 
-    pub(crate) fn range(file: &str, field: &str, value: impl ToString, allowed: &str) -> Self {
+    pub(crate) fn range(file: &str, field: &str, value: &dyn ToString, allowed: &str) -> Self {
         Self::Range {
             file: file.to_owned(),
             field: field.to_owned(),

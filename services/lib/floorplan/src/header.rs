@@ -71,7 +71,7 @@ impl PlanHeader {
             .resolution
             .ok_or_else(|| missing("resolution", "the side of a cell in metres, such as 0.05"))?;
         if !RESOLUTION_M.contains(&resolution) {
-            return Err(PlanError::range(file, "resolution", resolution, "0.01 to 0.5 m a cell"));
+            return Err(PlanError::range(file, "resolution", &resolution, "0.01 to 0.5 m a cell"));
         }
         let origin = raw.origin.ok_or_else(|| missing("origin", "x, y and yaw of the lower left corner"))?;
         let [x, y, yaw] = match origin.as_slice() {
@@ -81,29 +81,29 @@ impl PlanHeader {
                 return Err(PlanError::range(
                     file,
                     "origin",
-                    format!("{} numbers", other.len()),
+                    &format!("{} numbers", other.len()),
                     "[x, y, yaw]",
                 ));
             }
         };
         for value in [x, y] {
-            if !(value.abs() <= MAX_ORIGIN_M) {
-                return Err(PlanError::range(file, "origin", value, "-5000 to 5000 m"));
+            if !(-MAX_ORIGIN_M..=MAX_ORIGIN_M).contains(&value) {
+                return Err(PlanError::range(file, "origin", &value, "-5000 to 5000 m"));
             }
         }
         // Written by hand or by a program, zero is zero to a few digits.
-        if !(yaw.abs() < 1e-6) {
+        if !(-1e-6..=1e-6).contains(&yaw) {
             return Err(PlanError::Turned { file: file.to_owned(), yaw_rad: yaw });
         }
         let occupied_thresh = raw.occupied_thresh.unwrap_or(0.65);
         let free_thresh = raw.free_thresh.unwrap_or(0.196);
         for (field, value) in [("occupied_thresh", occupied_thresh), ("free_thresh", free_thresh)] {
             if !(0.0..=1.0).contains(&value) {
-                return Err(PlanError::range(file, field, value, "0 to 1"));
+                return Err(PlanError::range(file, field, &value, "0 to 1"));
             }
         }
         if free_thresh >= occupied_thresh {
-            return Err(PlanError::range(file, "free_thresh", free_thresh, "below occupied_thresh"));
+            return Err(PlanError::range(file, "free_thresh", &free_thresh, "below occupied_thresh"));
         }
         Ok(Self {
             image,

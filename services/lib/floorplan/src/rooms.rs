@@ -60,7 +60,7 @@ impl Rooms {
             return Err(PlanError::range(
                 file,
                 &field,
-                "without a free cell of the plan",
+                &"without a free cell of the plan",
                 "an area with free cells",
             ));
         }

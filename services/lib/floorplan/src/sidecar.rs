@@ -146,13 +146,18 @@ impl Sidecar {
 
     fn check(&self, file: &str) -> Result<(), PlanError> {
         if self.rooms.len() > MAX_ROOMS {
-            return Err(PlanError::range(file, "rooms", format!("{} rooms", self.rooms.len()), "at most 48"));
+            return Err(PlanError::range(
+                file,
+                "rooms",
+                &format!("{} rooms", self.rooms.len()),
+                "at most 48",
+            ));
         }
         if self.doors.len() > MAX_DOORS {
             return Err(PlanError::range(
                 file,
                 "doors",
-                format!("{} doors", self.doors.len()),
+                &format!("{} doors", self.doors.len()),
                 "at most 256",
             ));
         }
@@ -160,11 +165,11 @@ impl Sidecar {
             for (field, value) in [("pad.x", pad.x), ("pad.y", pad.y)] {
                 check_coordinate(file, field, value)?;
             }
-            if !(pad.heading_deg.abs() <= 360.0) {
+            if !(-360.0..=360.0).contains(&pad.heading_deg) {
                 return Err(PlanError::range(
                     file,
                     "pad.heading_deg",
-                    pad.heading_deg,
+                    &pad.heading_deg,
                     "-360 to 360 degrees",
                 ));
             }
@@ -179,7 +184,7 @@ impl Sidecar {
                 return Err(PlanError::range(
                     file,
                     &field,
-                    format!("{:.2} m wide", door.width()),
+                    &format!("{:.2} m wide", door.width()),
                     "0.3 to 10 m",
                 ));
             }
@@ -188,12 +193,17 @@ impl Sidecar {
             let field = format!("rooms: {}", room.name);
             check_name(file, "rooms.name", &room.name)?;
             if self.rooms[..k].iter().any(|other| other.name == room.name) {
-                return Err(PlanError::range(file, &field, "used twice", "one area a name"));
+                return Err(PlanError::range(file, &field, &"used twice", "one area a name"));
             }
             if let Area::Polygon(corners) = &room.area
                 && !(3..=256).contains(&corners.len())
             {
-                return Err(PlanError::range(file, &field, format!("{} corners", corners.len()), "3 to 256"));
+                return Err(PlanError::range(
+                    file,
+                    &field,
+                    &format!("{} corners", corners.len()),
+                    "3 to 256",
+                ));
             }
             for value in room.area.coordinates() {
                 check_coordinate(file, &field, value)?;
@@ -208,12 +218,12 @@ fn check_name(file: &str, field: &str, name: &str) -> Result<(), PlanError> {
     if (1..=31).contains(&name.trim().len()) && !name.chars().any(char::is_control) {
         return Ok(());
     }
-    Err(PlanError::range(file, field, format!("{name:?}"), "1 to 31 bytes of text"))
+    Err(PlanError::range(file, field, &format!("{name:?}"), "1 to 31 bytes of text"))
 }
 
 fn check_coordinate(file: &str, field: &str, value: f32) -> Result<(), PlanError> {
     if value.abs() <= MAX_COORDINATE_M {
         return Ok(());
     }
-    Err(PlanError::range(file, field, value, "-10000 to 10000 m"))
+    Err(PlanError::range(file, field, &value, "-10000 to 10000 m"))
 }

@@ -137,7 +137,7 @@ pub struct ServiceEntry {
     pub criticality: Criticality,
     /// When it is started again.
     pub restart: Restart,
-    /// `SCHED_FIFO` priority 1..=99 where permitted; 0 for the ordinary scheduler.
+    /// 1..=99: the higher, the sooner it gets the processor (niceness -1..=-19 where permitted); 0 is ordinary.
     pub priority: u8,
     /// Steps a second when nothing wakes it; 0 when only messages do.
     pub tick_hz: f64,

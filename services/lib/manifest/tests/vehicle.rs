@@ -119,3 +119,18 @@ proptest::proptest! {
         let _ = Vehicle::parse("v.toml", &broken);
     }
 }
+
+#[test]
+fn the_shipped_vehicles_can_be_flown() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../deploy/vehicles");
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let vehicle =
+            Vehicle::parse(path.to_str().unwrap(), &std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!(path.file_stem().unwrap().to_str(), Some(vehicle.name.as_str()));
+        assert!(vehicle.hover_fraction() < 0.6, "{}", vehicle.name);
+        count += 1;
+    }
+    assert!(count >= 2, "{count}");
+}

@@ -58,13 +58,13 @@ pub struct SonarConfig {
 impl Default for SonarConfig {
     fn default() -> Self {
         Self {
-            sigma: 0.05,
+            sigma: 0.06,
             sigma_per_m: 0.015,
             short: 0.06,
-            missed: 0.12,
+            missed: 0.18,
             random: 0.05,
             unexpected: 0.35,
-            temper: 0.6,
+            temper: 0.5,
             floor: 0.01,
             max_range: 4.0,
             max_elevation: 0.35,

@@ -40,7 +40,7 @@ impl Default for MotionConfig {
     fn default() -> Self {
         Self {
             velocity_noise: 0.35,
-            position_noise: 0.04,
+            position_noise: 0.05,
             distance_noise: 0.05,
             heading_noise: 0.02,
             heading_noise_per_m: 0.06,

@@ -5,7 +5,9 @@ use world::*;
 fn explore() {
     let world = World::new();
     type F = fn(&mut mcl::Config);
-    let variants: &[(&str, F)] = &[
+    let variants: &[(&str, F)] = &[ ("new", |_| {}), ("new.temper.35", |c| c.sonar.temper = 0.35), ("max2000", |c| c.population.max=2000), ("err.04", |c| c.population.error=0.04),
+];
+    let _old: &[(&str, F)] = &[
         ("base", |_| {}),
         ("temper1", |c| c.sonar.temper = 1.0),
         ("temper.4", |c| c.sonar.temper = 0.4),
@@ -22,7 +24,7 @@ fn explore() {
         ("heading.03", |c| {c.motion.heading_noise_per_m = 0.03;}),
         ("thr.8", |c| {c.resample.threshold = 0.8;}),
     ];
-    for flow in [false] {
+    for flow in [false,true] {
     for (name, f) in variants {
         let mut t = Trial { flow, ..Trial::default() };
         f(&mut t.config);

@@ -1,5 +1,5 @@
 //! A drone that flies exactly as told, and sonars that hear exactly what their cones meet, in an ASCII world.
-#![allow(dead_code, clippy::unwrap_used, reason = "shared by several test binaries")]
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "shared by several test binaries")]
 
 use avoid::grid::{insert, scroll};
 use avoid::{CELLS, GridRules, Histogram, SECTORS, WallLayer, Window, wrap};
@@ -22,10 +22,9 @@ pub struct World {
     pub plan: Plan,
     pub field: DistanceField,
     solid: DistanceField,
-    pub radius_of: f32,
 }
 
-/// Reads a map: `#` wall, `o` stands there but is not on the plan, `%` on the plan too but open (nothing); everything else is free.
+/// Reads a map: `#` wall, `o` stands there but is not on the plan; everything else is free.
 pub fn world(rows: &[&str], resolution: f64) -> World {
     let with = |keep: &str| -> Plan {
         let rows: Vec<String> = rows
@@ -38,7 +37,7 @@ pub fn world(rows: &[&str], resolution: f64) -> World {
     let (truth, plan) = (with("#o"), with("#"));
     let field = DistanceField::of_not_free(&plan, 2.0);
     let solid = DistanceField::new(&truth, 2.0);
-    World { truth, plan, field, solid, radius_of: RADIUS_M }
+    World { truth, plan, field, solid }
 }
 
 /// The middle of the character `mark`, metres.
@@ -182,9 +181,7 @@ impl Bench {
         }
         self.walls.follow(&to, |x, y| !world.is_free(x, y));
         self.track.advance(place.x, place.y);
-        let ahead =
-            self.steering.look_ahead(&self.config, &world.field, &place, |ahead| self.track.aim(ahead));
-        let aim = self.track.aim(ahead);
+        let aim = self.steering.aim(&self.config, &world.field, &place, &self.track);
         let (mut raw, mut smoothed, mut blocked) = ([0.0; SECTORS], [0.0; SECTORS], [0; SECTORS]);
         let scene = Scene {
             now,
@@ -197,7 +194,7 @@ impl Bench {
             dt_s: 0.05,
         };
         let mut histogram = Histogram { raw: &mut raw, smoothed: &mut smoothed, blocked: &mut blocked };
-        self.steering.step(&self.config, &scene, Some(aim), self.track.remaining(), &mut histogram)
+        self.steering.step(&self.config, &scene, aim, &mut histogram)
     }
 }
 
@@ -233,6 +230,9 @@ pub fn follow(world: &World, line: &[(f32, f32)], seconds: f32) -> Flown {
         flown.path.push((drone.x, drone.y));
         now += STEP_NS;
         flown.seconds += 0.05;
+        if std::env::var("TRACE").is_ok() && (flown.seconds*20.0) as u32 % 10==0 {
+          eprintln!("{:.1} x {:.2} y {:.2} h {:.2} v {:.2} {:.2} {:?} dir {:.2} tgt {:.2} free {:.2} al {:.2} as {:.2} gap {:.2} near {:?}", flown.seconds, drone.x, drone.y, drone.heading, steer.velocity.0, steer.velocity.1, steer.reason, steer.direction, steer.target, steer.free_m, bench.track.along(), bench.track.aside(), world.gap(drone.x,drone.y), bench.senses.near(now,0.5).map(|(b,d)| format!("{:.0}:{:.2}", b.to_degrees(), d)).collect::<Vec<_>>());
+        }
         if bench.track.remaining() < 0.15 {
             flown.arrived = true;
             break;

@@ -39,6 +39,7 @@ struct Kept<T: Message> {
     newest: Option<SharedSample<T>>,
     output: SharedOutput<T>,
     spare: Option<SharedLoan<T>>,
+    offered: bool,
 }
 
 impl<T: Message> Keep for Kept<T> {
@@ -56,7 +57,9 @@ impl<T: Message> Keep for Kept<T> {
     fn offer(&mut self) -> bool {
         // What the publisher sent in its last moments is still to be taken.
         self.keep();
-        let Some(newest) = &self.newest else { return false };
+        // A service that died again before it published anything gets the same offer once more: it is still
+        // in the history of the keeper's own channel.
+        let Some(newest) = &self.newest else { return self.offered };
         // The sample lies in the dead publisher's memory, which clean-up is about to remove: copy it into
         // the keeper's own.
         let Some(mut loan) = self.spare.take().or_else(|| self.output.loan()) else { return false };
@@ -64,6 +67,7 @@ impl<T: Message> Keep for Kept<T> {
         self.newest = None;
         self.output.send(loan);
         self.spare = self.output.loan();
+        self.offered = true;
         true
     }
 }
@@ -134,7 +138,7 @@ impl TopicVisitor for KeepTopic<'_> {
         // The place to copy into is taken now, so that a full /dev/shm shows at start and not at a crash.
         let spare = output.loan();
         let input = self.node.input::<T>(self.name, 1)?;
-        Ok(Box::new(Kept { topic: self.name.to_owned(), input, newest: None, output, spare }))
+        Ok(Box::new(Kept { topic: self.name.to_owned(), input, newest: None, output, spare, offered: false }))
     }
 }
 

@@ -113,8 +113,7 @@ impl Cone {
         let mut nearest: Option<Heard> = None;
         let mut limit = RANGE_M.1;
         for (along, to_left, to_up, loss) in &self.rays {
-            let ray: [f32; 3] =
-                std::array::from_fn(|k| along * axis[k] + to_left * left[k] + to_up * up[k]);
+            let ray: [f32; 3] = std::array::from_fn(|k| along * axis[k] + to_left * left[k] + to_up * up[k]);
             // A ray need not go beyond what was already heard.
             let Some(hit) = world.cast(face, ray, limit) else { continue };
             let Some(range) = answer(&hit, ray, *loss, &mood) else { continue };
@@ -164,9 +163,8 @@ fn answer(hit: &RayHit, ray: [f32; 3], beam: f32, mood: &Mood) -> Option<f32> {
     } else if hit.surface == Surface::Soft && swallowed(hit.range, mood) {
         return None;
     }
-    let loss = beam
-        + incidence_loss(hit.surface, -dot(hit.normal, ray))
-        + curvature_loss(hit.curvature, hit.range);
+    let loss =
+        beam + incidence_loss(hit.surface, -dot(hit.normal, ray)) + curvature_loss(hit.curvature, hit.range);
     if margin(hit.range) + mood.jitter < loss {
         return None;
     }

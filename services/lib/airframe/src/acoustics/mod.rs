@@ -16,6 +16,8 @@
 
 pub mod beam;
 mod pose;
+#[cfg(test)]
+mod tests;
 
 pub use pose::{Mount, Pose6};
 

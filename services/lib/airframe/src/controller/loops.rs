@@ -169,7 +169,8 @@ mod tests {
     #[test]
     fn the_stick_law_is_the_measured_one() {
         // FACTS 1: 100 us gives 3.4, 200 gives 11.1, 300 gives 23.1 degrees.
-        for (offset, degrees) in [(100.0, 3.4), (200.0, 11.1), (300.0, 23.1), (500.0, 60.0), (-200.0, -11.1)] {
+        for (offset, degrees) in [(100.0, 3.4), (200.0, 11.1), (300.0, 23.1), (500.0, 60.0), (-200.0, -11.1)]
+        {
             let angle = 60.0 * stick_share(1500.0 + offset, &BETAFLIGHT_2025_12);
             assert!((angle - degrees).abs() < 0.25, "{offset}: {angle}");
         }

@@ -80,6 +80,8 @@ impl Receiver {
             }
         }
         if flight_valid {
+            // A gap may end between two passes: it is a loss all the same.
+            self.look_for_loss(now_ns, personality);
             self.valid_ns = Some(now_ns);
         }
     }

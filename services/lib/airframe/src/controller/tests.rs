@@ -214,7 +214,7 @@ fn payloads_have_the_lengths_of_the_table() {
 #[test]
 fn v2_is_answered_in_v2_and_box_names_match_box_ids() {
     let mut bench = Bench::new(1, 0.0, FailsafeSettings::default());
-    bench.controller.write(0, b"$X<\x00\x77\x00\x00\x00\xd6");
+    bench.controller.write(0, b"$X<\x00\x77\x00\x00\x00\xee");
     bench.run(0.1);
     let ids: Vec<u8> = bench.received.clone();
     assert_eq!(&ids[..6], b"$X>\x00\x77\x00", "{ids:02x?}");
@@ -230,8 +230,7 @@ fn sent_in_receiver_order_and_told_in_its_own() {
     let mut bench = Bench::new(1, 0.0, FailsafeSettings::default());
     bench.send(&[1510, 1520, 1030, 1540, 1050, 1060]);
     bench.run(0.2);
-    let rc: Vec<u16> =
-        bench.ask(105, &[]).1.chunks(2).map(|c| u16::from_le_bytes([c[0], c[1]])).collect();
+    let rc: Vec<u16> = bench.ask(105, &[]).1.chunks(2).map(|c| u16::from_le_bytes([c[0], c[1]])).collect();
     assert_eq!(rc[..6], [1510, 1520, 1540, 1030, 1050, 1060]);
     assert_eq!(bench.ask(64, &[]).1, [0, 1, 3, 2, 4, 5, 6, 7]);
 }

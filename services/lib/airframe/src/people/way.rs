@@ -16,6 +16,8 @@ const MOST_CELLS: usize = 400_000;
 pub(crate) struct Walker<'a> {
     ground: &'a Ground,
     open: Vec<bool>,
+    /// The same where one can walk to from the pad: where the drone flies, too.
+    shared: Vec<usize>,
     /// Steps from the last search's start; `u32::MAX` where it did not come.
     steps: Vec<u32>,
     touched: Vec<usize>,
@@ -34,13 +36,14 @@ impl<'a> Walker<'a> {
                 *distance >= needed && (x - pad.x).hypot(y - pad.y) >= pad_free
             })
             .collect();
-        Self { ground, steps: vec![u32::MAX; open.len()], touched: Vec::new(), open }
+        let joined = ground.flood(pad.x, pad.y, |cell| ground.is_free_on_foot(cell));
+        let shared = (0..open.len()).filter(|cell| open[*cell] && joined[*cell]).collect();
+        Self { ground, steps: vec![u32::MAX; open.len()], touched: Vec::new(), open, shared }
     }
 
     /// Places that lie a walk apart from each other, where the drone flies too; fewer when there is no room.
     pub(crate) fn draw_places<R: Rng + ?Sized>(&mut self, count: usize, rng: &mut R) -> Vec<(f32, f32)> {
-        let all: Vec<usize> = (0..self.open.len()).filter(|cell| self.open[*cell]).collect();
-        let Some(&start) = all.get(index(rng, all.len())) else { return Vec::new() };
+        let Some(&start) = self.shared.get(index(rng, self.shared.len())) else { return Vec::new() };
         let mut places = vec![start];
         let mut here = start;
         while places.len() < count {

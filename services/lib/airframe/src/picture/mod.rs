@@ -1,6 +1,8 @@
 //! One picture of a flight: a self-contained SVG that any browser shows.
 
 mod page;
+#[cfg(test)]
+mod tests;
 mod track;
 
 pub use track::{CloseCall, Track};
@@ -165,7 +167,10 @@ impl Picture<'_> {
         }
         let smooth = "fill=\"none\" stroke-linejoin=\"round\" stroke-linecap=\"round\"";
         let flown = page.line(self.track.flown.iter().map(|p| Some(*p)));
-        page.path(&flown, &format!("{smooth} stroke=\"#ffffff\" stroke-opacity=\"0.7\" stroke-width=\"4.5\""));
+        page.path(
+            &flown,
+            &format!("{smooth} stroke=\"#ffffff\" stroke-opacity=\"0.7\" stroke-width=\"4.5\""),
+        );
         page.path(&flown, &format!("{smooth} stroke=\"{FLOWN}\" stroke-width=\"2.2\""));
         let believed = page.line(self.track.believed.iter().copied());
         page.path(&believed, &format!("{smooth} stroke=\"{BELIEVED}\" stroke-width=\"1.1\""));
@@ -190,21 +195,30 @@ impl Picture<'_> {
             let text = format!("{:.0} cm", call.clearance * 100.0);
             let minutes = (call.time_s / 60.0) as u32;
             let seconds = (call.time_s % 60.0) as u32;
-            page.raw(&format!(
-                "<g><title>{} from {} at {minutes}:{seconds:02}</title><circle cx=\"{x:.1}\" cy=\"{y:.1}\" \
-                 r=\"8\" fill=\"none\" stroke=\"{CALL}\" stroke-width=\"2\"/><text x=\"{tx:.1}\" y=\"{:.1}\" \
-                 font-size=\"12\" font-weight=\"600\" fill=\"{CALL}\" text-anchor=\"{anchor}\" \
-                 stroke=\"#ffffff\" stroke-width=\"3\" paint-order=\"stroke\">{text}</text></g>",
-                escaped(&text),
-                escaped(&call.name),
-                y - 8.0
-            ));
+            // Twice, because not every viewer paints strokes under fills.
+            let label = |style: &str| {
+                format!(
+                    "<text x=\"{tx:.1}\" y=\"{:.1}\" font-size=\"12\" font-weight=\"600\" \
+                     text-anchor=\"{anchor}\" {style}>{text}</text>",
+                    y - 8.0
+                )
+            };
+            page.titled(&format!("{text} from {} at {minutes}:{seconds:02}", call.name), |page| {
+                page.raw(&format!(
+                    "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"8\" fill=\"none\" stroke=\"{CALL}\" \
+                     stroke-width=\"2\"/>"
+                ));
+                page.raw(&label("fill=\"none\" stroke=\"#ffffff\" stroke-width=\"3\""));
+                page.raw(&label(&format!("fill=\"{CALL}\"")));
+            });
         }
     }
 
     fn legend(&self, page: &mut Page) {
         let swatch = |colour: &str| {
-            format!("<rect y=\"-10\" width=\"22\" height=\"12\" rx=\"2\" fill=\"{colour}\" stroke=\"#00000030\"/>")
+            format!(
+                "<rect y=\"-10\" width=\"22\" height=\"12\" rx=\"2\" fill=\"{colour}\" stroke=\"#00000030\"/>"
+            )
         };
         let stroke = |colour: &str, width: f32, dash: &str| {
             format!(
@@ -213,7 +227,9 @@ impl Picture<'_> {
             )
         };
         let ring = |colour: &str| {
-            format!("<circle cx=\"11\" cy=\"-4\" r=\"6\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>")
+            format!(
+                "<circle cx=\"11\" cy=\"-4\" r=\"6\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>"
+            )
         };
         page.legend(&[
             (stroke(FLOWN, 2.5, ""), "true path"),

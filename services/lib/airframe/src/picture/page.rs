@@ -15,7 +15,7 @@ const LEAST_WIDTH_PX: f32 = 1100.0;
 /// A line of the legend.
 const LEGEND_LINE_PX: f32 = 24.0;
 /// A column of the legend.
-const LEGEND_COLUMN_PX: f32 = 205.0;
+const LEGEND_COLUMN_PX: f32 = 215.0;
 
 pub(super) struct Page {
     body: String,
@@ -91,7 +91,8 @@ impl Page {
         if !text.is_empty() {
             let x = MARGIN_PX + x;
             let text = escaped(text);
-            let _ = writeln!(self.body, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" {style}>{text}</text>");
+            let _ =
+                writeln!(self.body, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" {style}>{text}</text>");
         }
     }
 

@@ -9,6 +9,9 @@ pub const SEEN_M: f32 = 3.0;
 /// Reachable places leave this much room around the disc, metres.
 pub const ROOM_M: f32 = 0.15;
 
+/// The drone looks around again after this way, metres: what could be seen from between only is a sliver.
+const LOOK_M: f32 = 0.1;
+
 /// Which cells ought to be seen and which were.
 #[derive(Clone, Debug)]
 pub struct Coverage {
@@ -20,8 +23,9 @@ pub struct Coverage {
     wanted_count: usize,
     seen_count: usize,
     reach: i32,
-    last_cell: Option<(usize, usize)>,
-    visited: Vec<bool>,
+    last_look: Option<(f32, f32)>,
+    /// Cells that were looked around from.
+    looked: Vec<bool>,
     sight: Sight,
 }
 
@@ -78,8 +82,8 @@ impl Coverage {
             wanted_count,
             seen_count: 0,
             reach,
-            last_cell: None,
-            visited: vec![false; count],
+            last_look: None,
+            looked: vec![false; count],
             sight,
         }
     }
@@ -88,14 +92,12 @@ impl Coverage {
     pub fn visit(&mut self, world: &World, x: f32, y: f32) {
         let ground = world.ground();
         let Some((column, row)) = ground.cell_at(x, y) else { return };
-        if self.last_cell == Some((column, row)) {
-            return;
-        }
-        self.last_cell = Some((column, row));
+        let near = self.last_look.is_some_and(|(lx, ly)| (x - lx).hypot(y - ly) < LOOK_M);
         let here = row * ground.width() + column;
-        if std::mem::replace(&mut self.visited[here], true) {
+        if near || std::mem::replace(&mut self.looked[here], true) {
             return;
         }
+        self.last_look = Some((x, y));
         let (seen, wanted, count) = (&mut self.seen, &self.wanted, &mut self.seen_count);
         self.sight.scan(ground, column, row, self.reach, |cell| {
             if wanted[cell] && !seen[cell] {
@@ -138,11 +140,7 @@ fn touches(marked: &[bool], width: usize, cell: usize) -> bool {
     (-1..=1).any(|dr| {
         (-1..=1).any(|dc| {
             let (c, r) = (c + dc, r + dr);
-            c >= 0
-                && r >= 0
-                && c < width as isize
-                && r < height
-                && marked[r as usize * width + c as usize]
+            c >= 0 && r >= 0 && c < width as isize && r < height && marked[r as usize * width + c as usize]
         })
     })
 }
@@ -215,7 +213,7 @@ mod tests {
         let world = world(&WIDE, (1.0, 0.5));
         let mut coverage = Coverage::new(&world, 0.1);
         assert!(coverage.fraction() == 0.0);
-        coverage.visit(&world, 1.0, 0.5);
+        coverage.visit(&world, 0.5, 0.5);
         let first = coverage.fraction();
         // Its own room, and of the other one what lies within 3 m and not behind the wall's stumps.
         assert!(first > 0.5 && first < 0.9, "{first}");

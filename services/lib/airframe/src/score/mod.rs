@@ -3,6 +3,8 @@
 mod coverage;
 mod report;
 mod sight;
+#[cfg(test)]
+mod tests;
 
 pub use coverage::{Coverage, ROOM_M, SEEN_M};
 pub use report::{
@@ -106,9 +108,9 @@ impl Scorer {
     pub fn observe(&mut self, world: &World, seen: &Observation) {
         let dt = self.last_s.map_or(0.0, |last| (seen.time_s - last).max(0.0));
         self.last_s = Some(seen.time_s);
-        let error = seen.estimate.map(|(x, y, heading)| {
-            ((x - seen.x).hypot(y - seen.y), wrapped(heading - seen.yaw).abs())
-        });
+        let error = seen
+            .estimate
+            .map(|(x, y, heading)| ((x - seen.x).hypot(y - seen.y), wrapped(heading - seen.yaw).abs()));
         self.follow_fix(seen.time_s, error.map(|e| e.0));
         if !seen.airborne {
             self.last_place = None;
@@ -128,7 +130,7 @@ impl Scorer {
             self.lost_s += dt;
             return;
         };
-        if !(metres <= LOST_M) {
+        if metres.is_nan() || metres > LOST_M {
             self.lost_s += dt;
         }
         if metres.is_finite() && seen.time_s - self.last_error_s >= ERROR_PERIOD_S - 1e-6 {

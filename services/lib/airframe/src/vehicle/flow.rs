@@ -14,8 +14,8 @@
 //! so a nose that goes down looks like flying backwards, a right side that goes down like flying left, and
 //! v_x = D (x count / period + w_pitch), v_y = D (y count / period - w_roll).
 
-use super::noise::{normal, within};
 use super::Motion;
+use super::noise::{normal, within};
 use crate::controller::{Wire, encode_v2};
 use nalgebra::Vector3;
 use rand::{Rng, RngExt};
@@ -43,8 +43,8 @@ const RANGE_LEAST_M: f64 = 0.02;
 /// Quality over a good floor and its scatter, of 255.
 const QUALITY: f64 = 120.0;
 const QUALITY_SCATTER: f64 = 14.0;
-/// Bare floor without texture begins where the sum of waves exceeds this share: about one part in thirty.
-const BARE_ABOVE: f64 = 0.72;
+/// Bare floor without texture begins where the sum of waves exceeds this share: about one part in forty.
+const BARE_ABOVE: f64 = 0.80;
 
 /// What the sensor is, from the vehicle file.
 #[derive(Clone, Copy, Debug)]
@@ -149,14 +149,7 @@ impl FlowSensor {
         }
     }
 
-    fn send(
-        &mut self,
-        now_ns: u64,
-        motion: &Motion,
-        ground: &Ground,
-        distance: f64,
-        random: &mut impl Rng,
-    ) {
+    fn send(&mut self, now_ns: u64, motion: &Motion, ground: &Ground, distance: f64, random: &mut impl Rng) {
         let period = 1.0 / self.settings.rate_hz;
         let seen = (self.settings.min_height_m..=self.settings.max_height_m).contains(&distance);
         let contrast = self.contrast(motion, ground);
@@ -169,10 +162,7 @@ impl FlowSensor {
         let shown = if seen { share * self.scale } else { 0.0 };
         let sigma = (NOISE_RAD_S * period + SMEAR * self.turned) / contrast.max(0.3);
         let (sin, cos) = self.mount;
-        let turned = [
-            cos * self.sum[0] + sin * self.sum[1],
-            cos * self.sum[1] - sin * self.sum[0],
-        ];
+        let turned = [cos * self.sum[0] + sin * self.sum[1], cos * self.sum[1] - sin * self.sum[0]];
         let mut counts = [0_i32; 2];
         for (axis, count) in counts.iter_mut().enumerate() {
             let noise = if seen { sigma * normal(random) } else { 0.0 };

@@ -1,7 +1,7 @@
 //! Gyroscope and accelerometer of the flight controller.
 
-use super::noise::{normal, within};
 use super::Motion;
+use super::noise::{normal, within};
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::Rng;
 

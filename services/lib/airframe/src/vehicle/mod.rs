@@ -19,7 +19,7 @@ pub use flow::{FlowSensor, FlowSettings, Ground, MSP2_SENSOR_OPTIC_FLOW, MSP2_SE
 pub use imu::Inertial;
 pub use shape::{Shape, Variation};
 
-pub(crate) use noise::{normal, within};
+pub(crate) use noise::normal;
 
 use gust::Gust;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -224,8 +224,7 @@ impl Quadrotor {
         self.touching = touching;
         acceleration += push / mass;
         angular += twist.component_div(&shape.inertia_kg_m2);
-        self.motion.specific_force =
-            body.inverse_transform_vector(&acceleration);
+        self.motion.specific_force = body.inverse_transform_vector(&acceleration);
 
         // Semi-implicit Euler: velocities first, then places with the new velocities.
         let motion = &mut self.motion;

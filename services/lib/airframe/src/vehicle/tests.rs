@@ -63,8 +63,7 @@ fn thrust_power_and_weight_agree() {
 fn each_motor_turns_the_craft_as_mounted() {
     // More thrust on the left rolls right (positive); on the rear, nose down (positive); on the two that
     // turn clockwise (rear right, front left), counter-clockwise (positive).
-    for (commands, axis) in
-        [([0.4, 0.4, 0.6, 0.6], 0), ([0.6, 0.4, 0.6, 0.4], 1), ([0.6, 0.4, 0.4, 0.6], 2)]
+    for (commands, axis) in [([0.4, 0.4, 0.6, 0.6], 0), ([0.6, 0.4, 0.6, 0.4], 1), ([0.6, 0.4, 0.4, 0.6], 2)]
     {
         let (mut craft, mut random) = quadrotor(5.0);
         for _ in 0..100 {
@@ -90,7 +89,8 @@ fn the_ground_carries_and_fades_with_height() {
 fn a_crash_tumbles_and_does_not_explode() {
     let (mut craft, mut random) = quadrotor(1.0);
     for i in 0..20_000_u32 {
-        let wild: [f64; 4] = std::array::from_fn(|m| f64::from(i.wrapping_mul(7919 + m as u32) % 1000) / 900.0);
+        let wild: [f64; 4] =
+            std::array::from_fn(|m| f64::from(i.wrapping_mul(7919 + m as u32) % 1000) / 900.0);
         let mut around = AROUND;
         if i % 3 == 0 {
             let (sin, cos) = f64::from(i).sin_cos();

@@ -6,9 +6,7 @@ use super::ground::Ground;
 use super::index::Index;
 use super::solid::{NO_OBJECT, Role, Solid, Surface};
 use super::walls::{Edge, Walls};
-use super::{
-    AsBuilt, CEILING_M, ClutterLevel, DoorPlace, FLIGHT_BAND_M, LINTEL_M, Object, PadPlace, World,
-};
+use super::{AsBuilt, CEILING_M, ClutterLevel, DoorPlace, FLIGHT_BAND_M, LINTEL_M, Object, PadPlace, World};
 use crate::clutter::{self, Piece};
 use crate::people::Crowd;
 use floorplan::{Plan, Sidecar};
@@ -210,9 +208,7 @@ fn file_pieces(file: &WorldFile, built: &AsBuilt, ceiling: f32) -> Vec<Piece> {
                 bottom,
                 top,
             ),
-            ShapeWord::Cylinder => {
-                Solid::new_cylinder(place, entry.radius_m.unwrap_or(0.1), bottom, top)
-            }
+            ShapeWord::Cylinder => Solid::new_cylinder(place, entry.radius_m.unwrap_or(0.1), bottom, top),
         };
         let solid = solid.with_surface(entry.surface);
         pieces.push(Piece { name: entry.name.clone(), parts: vec![solid], outline: solid });

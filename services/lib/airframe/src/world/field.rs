@@ -6,11 +6,8 @@ pub(crate) fn squared_distances(width: usize, height: usize, marked: impl Fn(usi
     let mut field: Vec<f32> =
         (0..width * height).map(|i| if marked(i) { 0.0 } else { f32::INFINITY }).collect();
     let longest = width.max(height);
-    let mut scratch = Scratch {
-        values: vec![0.0; longest],
-        parabolas: vec![0; longest],
-        borders: vec![0.0; longest + 1],
-    };
+    let mut scratch =
+        Scratch { values: vec![0.0; longest], parabolas: vec![0; longest], borders: vec![0.0; longest + 1] };
     for column in 0..width {
         for row in 0..height {
             scratch.values[row] = field[row * width + column];

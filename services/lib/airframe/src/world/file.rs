@@ -223,9 +223,7 @@ impl WorldFile {
     /// [`WorldError::Syntax`] for TOML that is not a world, [`WorldError::Range`] for values that make no sense.
     pub fn parse(file: &str, text: &str) -> Result<Self, WorldError> {
         let mut world: Self = toml::from_str(text).map_err(|error| {
-            let line = error
-                .span()
-                .map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
+            let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
             let message = error.message().replace('\n', " ");
             let message = line.map_or(message.clone(), |line| format!("line {line}: {message}"));
             WorldError::Syntax { file: file.to_owned(), message }
@@ -240,12 +238,7 @@ impl WorldFile {
             if value.is_finite() && (low..=high).contains(&value) {
                 Ok(())
             } else {
-                Err(WorldError::Range {
-                    file: file.to_owned(),
-                    field,
-                    value: format!("{value}"),
-                    allowed,
-                })
+                Err(WorldError::Range { file: file.to_owned(), field, value: format!("{value}"), allowed })
             }
         };
         let place = |name: &str, x: f32, y: f32, yaw: f32| {
@@ -275,9 +268,7 @@ impl WorldFile {
             };
             let stray = match s.shape {
                 ShapeWord::Box => s.radius_m.map(|_| "radius_m"),
-                ShapeWord::Cylinder => {
-                    s.length_m.map(|_| "length_m").or(s.width_m.map(|_| "width_m"))
-                }
+                ShapeWord::Cylinder => s.length_m.map(|_| "length_m").or(s.width_m.map(|_| "width_m")),
             };
             let bad = |key: &str, value: &str, allowed: &'static str| WorldError::Range {
                 file: file.to_owned(),
@@ -357,9 +348,7 @@ mod tests {
         assert!(stray.contains("radius_m"), "{stray}");
         let missing = message(&good.replace("width_m = 0.4", ""));
         assert!(missing.contains("width_m is missing"), "{missing}");
-        let fast = message(
-            "[[person]]\nname = \"Ana\"\nspeed_m_s = 9.0\nway = [[0.0, 0.0], [1.0, 0.0]]\n",
-        );
+        let fast = message("[[person]]\nname = \"Ana\"\nspeed_m_s = 9.0\nway = [[0.0, 0.0], [1.0, 0.0]]\n");
         assert!(fast.contains("0.5 to 1.4"), "{fast}");
     }
 }

@@ -80,9 +80,7 @@ impl Ground {
         for row in low.1..=high.1 {
             for column in low.0..=high.0 {
                 let (x, y) = self.centre(column, row);
-                if solid.outline_distance(x, y) <= 0.0
-                    && !act(&mut self.cells[row * self.width + column])
-                {
+                if solid.outline_distance(x, y) <= 0.0 && !act(&mut self.cells[row * self.width + column]) {
                     return false;
                 }
             }

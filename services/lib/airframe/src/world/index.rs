@@ -88,8 +88,8 @@ impl Index {
 
     /// Calls `act` with each square's list in the rectangle around a point. A thing that spans squares
     /// comes more than once.
-    pub(crate) fn around(&self, x: f32, y: f32, reach: f32, mut act: impl FnMut(u32)) {
-        self.within([x - reach, y - reach, x + reach, y + reach], |id| act(id));
+    pub(crate) fn around(&self, x: f32, y: f32, reach: f32, act: impl FnMut(u32)) {
+        self.within([x - reach, y - reach, x + reach, y + reach], act);
     }
 
     /// The same for any rectangle.

@@ -14,16 +14,18 @@ mod ground;
 mod index;
 mod query;
 mod solid;
+#[cfg(test)]
+mod tests;
 mod walls;
 
 pub use as_built::AsBuilt;
+pub(crate) use build::table as table_piece;
 pub use file::{
     CarpetEntry, DoorEntry, PadEntry, PersonEntry, ShapeWord, SolidEntry, TableEntry, WorldError, WorldFile,
 };
 pub use ground::Ground;
 pub use query::{Nearest, RayHit};
 pub use solid::{Role, Shape, Solid, Surface};
-pub(crate) use build::table as table_piece;
 pub(crate) use walls::{Edge, rectangles};
 
 use crate::people::Crowd;

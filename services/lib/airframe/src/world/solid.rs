@@ -231,11 +231,8 @@ impl Solid {
             4 => (0.0, 0.0, 1.0),
             _ => (0.0, 0.0, -1.0),
         };
-        let normal = [
-            local.0 * self.cos - local.1 * self.sin,
-            local.0 * self.sin + local.1 * self.cos,
-            local.2,
-        ];
+        let normal =
+            [local.0 * self.cos - local.1 * self.sin, local.0 * self.sin + local.1 * self.cos, local.2];
         Some(Meeting { t: enter.max(0.0), normal, face })
     }
 
@@ -289,8 +286,7 @@ mod tests {
     #[test]
     fn clearance_agrees_with_hand_geometry() {
         // A 2 x 1 m box turned by a quarter: 1 m along x, 2 m along y, from 0.4 to 1.0 m.
-        let solid =
-            Solid::new_box((5.0, 5.0), (2.0, 1.0), std::f32::consts::FRAC_PI_2, 0.4, 1.0);
+        let solid = Solid::new_box((5.0, 5.0), (2.0, 1.0), std::f32::consts::FRAC_PI_2, 0.4, 1.0);
         let near = |a: f32, b: f32| assert!((a - b).abs() < 1e-4, "{a} is not {b}");
         near(solid.clearance(6.0, 5.0, 0.5, 0.8, 0.2), 0.3);
         near(solid.clearance(6.0, 7.0, 0.5, 0.8, 0.2), 0.5 * f32::sqrt(5.0) - 0.2);

@@ -60,8 +60,7 @@ impl Walls {
         let raster = Raster { width, height, solid: &solid };
         let runs = raster.runs();
         let facing = raster.facing(&runs, resolution);
-        let mut walls =
-            Self { width, resolution, origin: plan.origin(), facing, blocks: Vec::new() };
+        let mut walls = Self { width, resolution, origin: plan.origin(), facing, blocks: Vec::new() };
         let limit = ((BLOCK_M / resolution).round() as usize).max(1);
         let mut solids = Vec::new();
         let rectangles = rectangles(width, height, limit, |i| solid[i]);
@@ -69,7 +68,8 @@ impl Walls {
             let (x0, y0) = walls.corner(c0, r0);
             let (x1, y1) = walls.corner(c1 + 1, r1 + 1);
             let shift = built.shift((x0 + x1) * 0.5, (y0 + y1) * 0.5);
-            let all = |mut cells: Box<dyn Iterator<Item = (isize, isize)>>| cells.all(|(c, r)| raster.at(c, r));
+            let all =
+                |mut cells: Box<dyn Iterator<Item = (isize, isize)>>| cells.all(|(c, r)| raster.at(c, r));
             let (ic0, ir0, ic1, ir1) = (c0 as isize, r0 as isize, c1 as isize, r1 as isize);
             let grow = |covered: bool| if covered { OVERLAP_M } else { 0.0 };
             let east = grow(all(Box::new((ir0..=ir1).map(move |r| (ic1 + 1, r)))));
@@ -79,9 +79,7 @@ impl Walls {
             let (x0, x1) = (x0 + shift.0 - west, x1 + shift.0 + east);
             let (y0, y1) = (y0 + shift.1 - south, y1 + shift.1 + north);
             let centre = ((x0 + x1) * 0.5, (y0 + y1) * 0.5);
-            solids.push(
-                Solid::new_box(centre, (x1 - x0, y1 - y0), 0.0, 0.0, ceiling).with_role(Role::Wall),
-            );
+            solids.push(Solid::new_box(centre, (x1 - x0, y1 - y0), 0.0, 0.0, ceiling).with_role(Role::Wall));
             walls.blocks.push(Block { cells: [c0 as u16, r0 as u16, c1 as u16, r1 as u16], shift });
         }
         let edges = raster
@@ -97,10 +95,7 @@ impl Walls {
     }
 
     fn corner(&self, column: usize, row: usize) -> (f32, f32) {
-        (
-            self.origin.0 + column as f32 * self.resolution,
-            self.origin.1 + row as f32 * self.resolution,
-        )
+        (self.origin.0 + column as f32 * self.resolution, self.origin.1 + row as f32 * self.resolution)
     }
 
     /// Which way the wall faces where block `block` was met at a place on its face.
@@ -178,11 +173,10 @@ impl Raster<'_> {
     /// Length in cells of the straight row of bare faces that each face belongs to.
     fn runs(&self) -> Vec<[u16; 4]> {
         let mut runs = vec![[0u16; 4]; self.width * self.height];
-        for face in 0..4 {
+        for face in 0..FACES.len() {
             // Faces towards x line up along y and the other way round.
             let along_y = face < 2;
-            let (lines, length) =
-                if along_y { (self.width, self.height) } else { (self.height, self.width) };
+            let (lines, length) = if along_y { (self.width, self.height) } else { (self.height, self.width) };
             for line in 0..lines {
                 let cell = |i: usize| if along_y { (line, i) } else { (i, line) };
                 let mut start = 0;
@@ -194,9 +188,11 @@ impl Raster<'_> {
                     } {
                         end += 1;
                     }
-                    for i in start..end {
-                        let (c, r) = cell(i);
-                        runs[r * self.width + c][face] = (end - start).min(u16::MAX as usize) as u16;
+                    let length = u16::try_from(end - start).unwrap_or(u16::MAX);
+                    for (c, r) in (start..end).map(cell) {
+                        if let Some(run) = runs[r * self.width + c].get_mut(face) {
+                            *run = length;
+                        }
                     }
                     start = end.max(start + 1);
                 }
@@ -230,7 +226,8 @@ impl Raster<'_> {
         for oy in -radius..=radius {
             for ox in -radius..=radius {
                 let squared = (ox * ox + oy * oy) as f32;
-                if squared > 0.0 && ox * ox + oy * oy <= radius * radius
+                if squared > 0.0
+                    && ox * ox + oy * oy <= radius * radius
                     && self.at(column + dx + ox, row + dy + oy)
                 {
                     // Near cells say more about this face than the next wall does.
@@ -324,7 +321,7 @@ mod tests {
             let west = (solid.x - solid.half_x, solid.y + solid.half_y - 0.025);
             let middle = (0.5..1.5).contains(&west.0) && (0.5..1.5).contains(&west.1);
             // Blocks on the surface only: the cell before the face is free.
-            if middle && Plan::from_ascii(&rows, 0.05).cell_at(west.0 - 0.05, west.1) == Cell::Free {
+            if middle && Plan::from_ascii(&rows, 0.05).cell_at(west.0 - 0.02, west.1) == Cell::Free {
                 let normal = slanted.normal(i, 1, west.0, west.1).expect("a face");
                 let angle = normal[1].atan2(normal[0]).to_degrees();
                 assert!((angle - 135.0).abs() < 12.0, "faces {angle} at {west:?}");

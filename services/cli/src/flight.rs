@@ -1,0 +1,152 @@
+//! A whole flight in lockstep: every service of the manifest, one simulated round.
+
+use crate::witness::{Orders, Witness};
+use airframe::picture::Picture;
+use airframe::score::FlightScore;
+use airframe::world::World;
+use anyhow::Result;
+use ipc_types::Verb;
+use manifest::{Body, Manifest};
+use navigation::NavigationConfig;
+use runtime::{Cache, Lockstep, Start};
+use std::path::Path;
+
+/// What a flight is flown with.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// The system's manifest, simulator included.
+    pub manifest: Manifest,
+    /// Directory that its paths start from.
+    pub root: std::path::PathBuf,
+    /// Configuration of the simulator.
+    pub simulator: simulator::Config,
+    /// Configuration of navigation; that of the manifest's file when absent.
+    pub navigation: Option<NavigationConfig>,
+    /// Longest flight, simulated seconds.
+    pub patience_s: f64,
+    /// Plans and tables shared between flights.
+    pub cache: Cache,
+}
+
+/// A flight being flown.
+pub struct Flight {
+    /// The services.
+    pub bus: Lockstep,
+    /// The world as built, for scoring.
+    pub world: World,
+    /// What is seen of the flight.
+    pub witness: Witness,
+    orders: Orders,
+    patience_ns: u64,
+    seed: u64,
+}
+
+/// Estimates are compared with the truth this often.
+const LOOK_NS: u64 = 20_000_000;
+/// The services have settled and the flight controller's boot grace (5 s, FACTS 1) is over.
+const ORDER_AT_NS: u64 = 6_000_000_000;
+/// Disarmed on the ground for so long: it is over.
+const REST_NS: u64 = 1_500_000_000;
+
+impl Flight {
+    /// Starts all services.
+    ///
+    /// # Errors
+    /// When one cannot start.
+    pub fn start(setup: &Setup, seed: u64) -> Result<Self> {
+        let mut bus = Lockstep::new(setup.manifest.clone(), &setup.root, seed, setup.cache.clone());
+        bus.add_with::<simulator::Simulator>(setup.simulator.clone())?;
+        bus.add::<flight::Flight>()?;
+        bus.add::<sonar::Sonar>()?;
+        bus.add::<flow::Flow>()?;
+        bus.add::<pilot::Pilot>()?;
+        bus.add::<localization::Localization>()?;
+        match &setup.navigation {
+            Some(config) => bus.add_with::<navigation::Navigation>(config.clone())?,
+            None => bus.add::<navigation::Navigation>()?,
+        }
+        let world = world(&setup.manifest, &setup.root, &setup.simulator, seed, &setup.cache)?;
+        let body = vehicle_body(&setup.manifest, &setup.root, &setup.cache)?;
+        let mut ports = bus.tool("cli");
+        let witness = Witness::open(&mut ports, &world, body)?;
+        let orders = Orders::open(&mut ports)?;
+        Ok(Self { bus, world, witness, orders, patience_ns: (setup.patience_s * 1e9) as u64, seed })
+    }
+
+    /// Runs for `seconds` of simulated time.
+    pub fn run_for(&mut self, seconds: f64) {
+        let until = self.bus.now() + ipc_types::nanoseconds(seconds);
+        while self.bus.now() < until {
+            let next = (self.bus.now() + LOOK_NS).min(until);
+            self.bus.run_until(next);
+            self.witness.look(&self.world);
+        }
+    }
+
+    /// Gives an order. Orders are numbered by the simulated clock, so that a flight repeats.
+    pub fn order(&mut self, verb: Verb, x: f32, y: f32) {
+        let number = (self.bus.now() / 1_000_000) as u32 | 1;
+        self.orders.give(verb, x, y, number);
+    }
+
+    /// Flies one round, from the order to rest.
+    pub fn fly_round(&mut self) {
+        self.run_for(ORDER_AT_NS as f64 * 1e-9);
+        self.order(Verb::PatrolStart, f32::NAN, f32::NAN);
+        while self.bus.now() < self.patience_ns {
+            self.run_for(0.5);
+            if self.witness.landed() || self.witness.contacts() > 0 {
+                break;
+            }
+        }
+        self.run_for(REST_NS as f64 * 1e-9);
+    }
+
+    /// The score of the flight.
+    #[must_use]
+    pub fn finish(self) -> FlightScore {
+        self.witness.finish(&self.world, self.seed)
+    }
+}
+
+/// The world that a flight with this seed is flown in.
+///
+/// # Errors
+/// When plan or world file are missing or wrong.
+pub fn world(
+    manifest: &Manifest,
+    root: &Path,
+    config: &simulator::Config,
+    seed: u64,
+    cache: &Cache,
+) -> Result<World> {
+    let seed = Start::service_seed(seed, <simulator::Simulator as runtime::Service>::NAME);
+    let start = Start::new(manifest.system.clone(), root, seed, 0, true, cache.clone())?;
+    Ok(simulator::build_world(config, &start)?)
+}
+
+/// The drone's body.
+///
+/// # Errors
+/// When the vehicle file is missing or wrong.
+pub fn vehicle_body(manifest: &Manifest, root: &Path, cache: &Cache) -> Result<Body> {
+    Ok(Start::new(manifest.system.clone(), root, 0, 0, true, cache.clone())?.vehicle.body)
+}
+
+/// Names of rooms and where to write them on a picture, from the plan's sidecar file; none without one.
+///
+/// # Errors
+/// When the sidecar is there and wrong.
+pub fn labels(manifest: &Manifest, root: &Path) -> Result<Vec<(String, f32, f32)>> {
+    let name = manifest.system.plan.replace(".yaml", ".rooms.yaml");
+    let Ok(bytes) = std::fs::read(root.join(&name)) else { return Ok(Vec::new()) };
+    let side = floorplan::Sidecar::parse(&name, &bytes)?;
+    Ok(side
+        .rooms
+        .iter()
+        .map(|room| {
+            let (x, y) = room.area.middle();
+            (room.name.clone(), x, y)
+        })
+        .collect())
+}

@@ -1,0 +1,179 @@
+//! `sereno rehearse`: the round, many times, in parallel, measured by the truth.
+
+use crate::arguments::Rehearse;
+use airframe::score::{FlightScore, Outcome, Report};
+use anyhow::{Context, Result, bail};
+use cli::flight::{Flight, Setup};
+use cli::place::{Place, vehicle_file};
+use indicatif::{ProgressBar, ProgressStyle};
+use navigation::NavigationConfig;
+use runtime::Cache;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// Longest flight, simulated seconds: past any battery.
+const PATIENCE_S: f64 = 1800.0;
+
+fn absolute(path: &Path) -> Result<String> {
+    Ok(std::path::absolute(path)?.display().to_string())
+}
+
+fn setup(place: &Place, order: &Rehearse) -> Result<Setup> {
+    let (mut manifest, root) = place.manifest(true)?;
+    if let Some(plan) = &order.plan {
+        manifest.system.plan = absolute(plan)?;
+        // A world file describes one building; another plan comes without.
+        manifest.system.world = String::new();
+    }
+    if let Some(world) = &order.world {
+        manifest.system.world = absolute(world)?;
+    }
+    manifest.system.vehicle = vehicle_file(&root, &order.vehicle)?;
+    let entry = manifest.services.get("simulator").context("the manifest has no simulator")?;
+    let text = std::fs::read_to_string(root.join(&entry.config)).with_context(|| entry.config.clone())?;
+    let mut simulator: simulator::Config = runtime::parse_config(&entry.config, &text)?;
+    order.clutter.clone_into(&mut simulator.clutter);
+    runtime::Validate::validate(&simulator)?;
+    let mut navigation = None;
+    if let Some(speed) = order.speed {
+        if !(0.1..=1.5).contains(&speed) {
+            bail!("--speed {speed} is out of range: allowed is 0.1..=1.5 m/s");
+        }
+        let entry = manifest.services.get("navigation").context("the manifest has no navigation")?;
+        let text = std::fs::read_to_string(root.join(&entry.config)).with_context(|| entry.config.clone())?;
+        let mut config: NavigationConfig = runtime::parse_config(&entry.config, &text)?;
+        config.cruise_m_s = speed as f32;
+        navigation = Some(config);
+    }
+    Ok(Setup { manifest, root, simulator, navigation, patience_s: PATIENCE_S, cache: Cache::default() })
+}
+
+/// A scored flight and how much simulated time it took.
+struct Flown {
+    score: FlightScore,
+    simulated_s: f64,
+}
+
+fn fly(setup: &Setup, seed: u64, pictures: Option<&PathBuf>) -> Result<Flown> {
+    let mut flight = Flight::start(setup, seed)?;
+    flight.fly_round();
+    let simulated_s = flight.bus.now() as f64 * 1e-9;
+    let Some(directory) = pictures else {
+        return Ok(Flown { score: flight.finish(), simulated_s });
+    };
+    let labels = cli::flight::labels(&setup.manifest, &setup.root)?;
+    let (score, drawn) = flight.finish_with_picture(&format!("Rehearsal, seed {seed}"), &labels);
+    std::fs::create_dir_all(directory)?;
+    std::fs::write(directory.join(format!("flight-{seed}.svg")), drawn)?;
+    Ok(Flown { score, simulated_s })
+}
+
+pub fn run(place: &Place, order: &Rehearse, json: bool) -> Result<ExitCode> {
+    if order.flights == 0 || order.flights > 100_000 {
+        bail!("--flights {} is out of range: allowed is 1..=100000", order.flights);
+    }
+    let setup = setup(place, order)?;
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let threads = order.threads.unwrap_or(cores).clamp(1, 256);
+    let progress = if json { ProgressBar::hidden() } else { ProgressBar::new(order.flights) };
+    progress.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} flights, {elapsed} gone, {eta} to go  {msg}")?);
+
+    let next = AtomicU64::new(0);
+    let flown: Mutex<Vec<(u64, Flown)>> = Mutex::new(Vec::new());
+    let failed: Mutex<Option<anyhow::Error>> = Mutex::new(None);
+    let began = Instant::now();
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                loop {
+                    let k = next.fetch_add(1, Ordering::Relaxed);
+                    let stop = failed.lock().unwrap_or_else(PoisonError::into_inner).is_some();
+                    if k >= order.flights || stop {
+                        break;
+                    }
+                    match fly(&setup, order.seed + k, order.pictures.as_ref()) {
+                        Ok(done) => {
+                            progress.set_message(format!("seed {}: {}", order.seed + k, done.score.report.outcome));
+                            flown.lock().unwrap_or_else(PoisonError::into_inner).push((k, done));
+                        }
+                        Err(error) => *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error),
+                    }
+                    progress.inc(1);
+                }
+            });
+        }
+    });
+    progress.finish_and_clear();
+    if let Some(error) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        return Err(error);
+    }
+    let mut flown = flown.into_inner().unwrap_or_else(PoisonError::into_inner);
+    flown.sort_by_key(|(k, _)| *k);
+    let wall = began.elapsed().as_secs_f64();
+    let simulated: f64 = flown.iter().map(|(_, done)| done.simulated_s).sum();
+    let scores: Vec<FlightScore> = flown.into_iter().map(|(_, done)| done.score).collect();
+    let report = Report::of(&scores, simulated / wall.max(1e-9));
+    write(order, &report, json)?;
+    let clean = report.flights.iter().all(|flight| flight.outcome == Outcome::LandedOnPad);
+    Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(2) })
+}
+
+fn write(order: &Rehearse, report: &Report, json: bool) -> Result<()> {
+    let text = serde_json::to_string_pretty(report)?;
+    match &order.out {
+        Some(path) if path.as_os_str() != "-" => {
+            std::fs::write(path, &text).with_context(|| path.display().to_string())?;
+        }
+        Some(_) => println!("{text}"),
+        None if json => println!("{text}"),
+        None => {}
+    }
+    if !json && order.out.as_ref().is_none_or(|path| path.as_os_str() != "-") {
+        print(report);
+    }
+    Ok(())
+}
+
+fn figure(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"))
+}
+
+fn print(report: &Report) {
+    println!("{:>5}  {:<18} {:>8} {:>9} {:>7} {:>7} {:>9} {:>7} {:>7}  remarks", "seed", "outcome", "contacts",
+        "clear m", "time s", "way m", "coverage", "err m", "p95 m");
+    for flight in &report.flights {
+        let mut remarks = flight.failsafes.clone();
+        remarks.extend(flight.skipped.iter().map(|skipped| format!("skipped {skipped}")));
+        println!(
+            "{:>5}  {:<18} {:>8} {:>9.2} {:>7.0} {:>7.0} {:>8.1}% {:>7} {:>7}  {}",
+            flight.seed,
+            flight.outcome.to_string(),
+            flight.contacts,
+            flight.min_clearance_m,
+            flight.time_s,
+            flight.distance_m,
+            100.0 * flight.coverage,
+            figure(flight.loc_error_m.median),
+            figure(flight.loc_error_m.p95),
+            remarks.join("; ")
+        );
+    }
+    let total = &report.total;
+    println!(
+        "{} flights: {} contacts, {} landed on the pad, coverage median {:.1} % p5 {:.1} %, error median {} m \
+         p95 {} m max {} m, least clearance {:.2} m, {:.0} times real time",
+        total.flights,
+        total.contacts,
+        total.landed_on_pad,
+        100.0 * total.coverage.median,
+        100.0 * total.coverage.p5,
+        figure(total.loc_error_m.median),
+        figure(total.loc_error_m.p95),
+        figure(total.loc_error_m.max),
+        total.min_clearance_m,
+        total.real_time_factor
+    );
+}

@@ -1,0 +1,129 @@
+//! What the simulator may be told.
+
+use airframe::controller::{FailsafeSettings, Firmware};
+use airframe::simulation::{Options, StartPlace};
+use airframe::world::ClutterLevel;
+use runtime::{ConfigError, Validate, within};
+
+/// The simulator's configuration file.
+#[derive(Clone, Debug, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// What the plan does not show: `none`, `light` or `full`.
+    pub clutter: String,
+    /// Where the drone stands at first: `pad` or `room` (anywhere, any heading).
+    pub start: String,
+    /// Which firmware the flight controller plays.
+    pub firmware: String,
+    /// How its failsafe is set: `factory` (the aircraft falls) or `level-descent` (FACTS 1, mitigation).
+    pub failsafe: String,
+    /// Share of the battery's charge at the start.
+    pub charge: f64,
+    /// Names of sonars that never answer.
+    pub dead_sonars: Vec<String>,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            clutter: "full".to_owned(),
+            start: "pad".to_owned(),
+            firmware: "betaflight-2025.12".to_owned(),
+            failsafe: "factory".to_owned(),
+            charge: 1.0,
+            dead_sonars: Vec::new(),
+        }
+    }
+}
+
+impl Validate for Config {
+    fn validate(&self) -> Result<(), ConfigError> {
+        if ClutterLevel::from_word(&self.clutter).is_none() {
+            return Err(ConfigError::range("clutter", &self.clutter, "none, light, full"));
+        }
+        if start_place(&self.start).is_none() {
+            return Err(ConfigError::range("start", &self.start, "pad, room"));
+        }
+        if Firmware::by_name(&self.firmware).is_none() {
+            return Err(ConfigError::range("firmware", &self.firmware, Firmware::NAMES.join(", ")));
+        }
+        if !FAILSAFES.contains(&self.failsafe.as_str()) {
+            return Err(ConfigError::range("failsafe", &self.failsafe, FAILSAFES.join(", ")));
+        }
+        within("charge", self.charge, 0.05..=1.0)
+    }
+}
+
+const FACTORY: &str = "factory";
+const LEVEL_DESCENT: &str = "level-descent";
+const FAILSAFES: [&str; 2] = [FACTORY, LEVEL_DESCENT];
+/// The failsafe throttle under the hover throttle: sinks at a few tenths of a metre a second.
+const UNDER_HOVER_US: f32 = 25.0;
+
+fn start_place(word: &str) -> Option<StartPlace> {
+    match word {
+        "pad" => Some(StartPlace::Pad),
+        "room" => Some(StartPlace::Room),
+        _ => None,
+    }
+}
+
+impl Config {
+    pub(crate) fn clutter(&self) -> ClutterLevel {
+        ClutterLevel::from_word(&self.clutter).unwrap_or(ClutterLevel::Full)
+    }
+
+    /// What `airframe` is told. A sonar name that the vehicle does not have is refused.
+    pub(crate) fn options(&self, vehicle: &manifest::Vehicle, seed: u64) -> Result<Options, ConfigError> {
+        let mut dead_sonars = 0;
+        for name in &self.dead_sonars {
+            let names = || vehicle.sonars.iter().map(|sonar| sonar.name.as_str());
+            let index = names().position(|known| known == name).ok_or_else(|| {
+                ConfigError::range("dead_sonars", name, names().collect::<Vec<_>>().join(", "))
+            })?;
+            dead_sonars |= 1 << index;
+        }
+        let failsafe = if self.failsafe == LEVEL_DESCENT {
+            FailsafeSettings::level_descent((hover_us(vehicle) - UNDER_HOVER_US) as u16)
+        } else {
+            FailsafeSettings::default()
+        };
+        Ok(Options {
+            clutter: self.clutter(),
+            seed,
+            firmware: Firmware::by_name(&self.firmware).unwrap_or_default(),
+            failsafe,
+            start: start_place(&self.start).unwrap_or_default(),
+            charge: self.charge,
+            dead_sonars,
+        })
+    }
+}
+
+/// Hover throttle on a half-full battery by the vehicle file: what an installer would find out.
+fn hover_us(vehicle: &manifest::Vehicle) -> f32 {
+    const HALF_FULL: f32 = 0.92;
+    let idle = vehicle.motors.idle_fraction;
+    let command = vehicle.hover_fraction().sqrt() / HALF_FULL;
+    1050.0 + 950.0 * ((command - idle) / (1.0 - idle)).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_nonsense_is_refused_by_name() {
+        assert_eq!(Config::default().validate(), Ok(()));
+        for (config, word) in [
+            (Config { clutter: "some".into(), ..Config::default() }, "clutter"),
+            (Config { start: "roof".into(), ..Config::default() }, "start"),
+            (Config { firmware: "inav".into(), ..Config::default() }, "firmware"),
+            (Config { failsafe: "hope".into(), ..Config::default() }, "failsafe"),
+            (Config { charge: f64::NAN, ..Config::default() }, "charge"),
+        ] {
+            let error = config.validate().unwrap_err().to_string();
+            assert!(error.contains(word) && error.contains("allowed"), "{error}");
+        }
+    }
+}
