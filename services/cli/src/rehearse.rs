@@ -115,7 +115,7 @@ pub fn run(place: &Place, order: &Rehearse, json: bool) -> Result<ExitCode> {
     let wall = began.elapsed().as_secs_f64();
     let simulated: f64 = flown.iter().map(|(_, done)| done.simulated_s).sum();
     let scores: Vec<FlightScore> = flown.into_iter().map(|(_, done)| done.score).collect();
-    let report = Report::of(&scores, simulated / wall.max(1e-9));
+    let report = Report::of(scores, simulated / wall.max(1e-9));
     write(order, &report, json)?;
     let clean = report.flights.iter().all(|flight| flight.outcome == Outcome::LandedOnPad);
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(2) })

@@ -29,13 +29,16 @@ const MOST_OFFSET_M_S2: f32 = 2.0;
 const SOFT_BELOW_M: f32 = 0.35;
 /// Rate of descent near the ground.
 const SOFT_M_S: f32 = 0.22;
-/// Without echoes the thrust is kept this much short of the reckoned one, so that an error of the hover
-/// throttle cannot turn the descent into a climb.
-const BLIND_BIAS_M_S2: f32 = 0.15;
+/// Without echoes the thrust is kept this much short of the reckoned one, more with time, so that an error of
+/// the hover throttle cannot turn the descent into a climb: 2 % too much of it is outweighed in 1.5 s.
+const BLIND_BIAS_M_S2: f32 = 0.1;
+const BLIND_BIAS_GROWTH_M_S3: f32 = 0.08;
+/// Most of it: a tenth of the weight.
+const MOST_BIAS_M_S2: f32 = 1.0;
 /// Height assumed when nobody knows it: patrol height.
 const UNKNOWN_HEIGHT_M: f32 = 1.2;
-/// Reckoned so far below the ground, it has long been reached.
-const BELOW_GROUND_M: f32 = 0.7;
+/// Reckoned so far below the ground, it has long been reached: six seconds more than was reckoned.
+const BELOW_GROUND_M: f32 = 2.0;
 /// Range to the ground of a standing aircraft before it was ever measured.
 const STANDING_RANGE_M: f32 = 0.06;
 
@@ -69,6 +72,8 @@ struct Falling {
     still_m: f32,
     still_ns: u64,
     low_ns: Option<u64>,
+    /// When it became blind.
+    blind_ns: Option<u64>,
 }
 
 /// What the descent says now.
@@ -161,6 +166,7 @@ impl Descent {
             still_m: height_m,
             still_ns: now,
             low_ns: None,
+            blind_ns: None,
         });
     }
 
@@ -202,7 +208,7 @@ impl Descent {
         } else {
             0.0
         };
-        let bias = if blind { BLIND_BIAS_M_S2 } else { 0.0 };
+        let bias = falling.bias(now, blind);
         let slope = falling.slope();
         falling.throttle_us =
             (falling.hover_us + (acceleration - falling.offset_m_s2 - bias) / slope).clamp(1050.0, 1900.0);
@@ -218,10 +224,20 @@ impl Falling {
         THRUST_EXPONENT * GRAVITY / (self.hover_us - 1000.0).max(50.0)
     }
 
+    /// Thrust held back while blind, as an acceleration; the reckoning does not count it.
+    fn bias(&mut self, now: u64, blind: bool) -> f32 {
+        if !blind {
+            self.blind_ns = None;
+            return 0.0;
+        }
+        let blind_s = seconds(*self.blind_ns.get_or_insert(now), now);
+        (BLIND_BIAS_M_S2 + BLIND_BIAS_GROWTH_M_S3 * blind_s).min(MOST_BIAS_M_S2)
+    }
+
     fn predict(&mut self, now: u64, blind: bool) {
         let dt = seconds(self.updated_ns, now).min(0.1);
         self.updated_ns = now;
-        let bias = if blind { BLIND_BIAS_M_S2 } else { 0.0 };
+        let bias = self.bias(now, blind);
         let acceleration = self.slope() * (self.throttle_us - self.hover_us) + self.offset_m_s2 + bias;
         self.climb_m_s += acceleration * dt;
         self.height_m += self.climb_m_s * dt;

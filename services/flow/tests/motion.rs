@@ -2,6 +2,8 @@
 //! without any of the equations that are tested.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+use std::f64::consts::TAU;
+
 use flow::{Config, Motion, Sensor};
 use ipc_types::{Attitude, FlowMotion};
 use msp::messages::{FlowFrame, RangeFrame};
@@ -114,8 +116,8 @@ fn turning_on_the_spot_is_no_motion() {
     // Nose and side rock by 8 degrees, a period of one second: up to 0.9 rad/s, 1 m/s uncompensated.
     let rock = |t: f64| Pose {
         position: [0.0, 0.0, 1.2],
-        roll: 0.1 * (6.28 * t).sin(),
-        pitch: 0.14 * (6.28 * t + 1.0).sin(),
+        roll: 0.1 * (TAU * t).sin(),
+        pitch: 0.14 * (TAU * t + 1.0).sin(),
     };
     let motions = fly(SENSOR, 120, true, rock);
     let settled = &motions[3..];

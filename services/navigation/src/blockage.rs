@@ -33,6 +33,12 @@ impl Blockage {
         *self = Self::default();
     }
 
+    /// Whether something stands in the way and is waited for.
+    #[must_use]
+    pub fn waiting(&self) -> bool {
+        self.waited_s > 0.0
+    }
+
     /// One decision: `blocked` as steering saw it, `along_m` the progress on the route.
     pub fn watch(&mut self, dt_s: f32, blocked: bool, along_m: f32, wait_s: f32, stuck_s: f32) -> Verdict {
         let dt_s = dt_s.clamp(0.0, 0.5);

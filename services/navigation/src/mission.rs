@@ -10,6 +10,8 @@ const STILL_M_S: f32 = 0.12;
 const STILL_S: f32 = 1.0;
 /// After hovering over the pad for this long a little farther off is good enough, seconds.
 const PATIENCE_S: f32 = 15.0;
+/// A round that was ordered and is still on the ground after this is given up, seconds: arming takes 5 to 10.
+const TAKE_OFF_S: f32 = 45.0;
 /// That little: times the usual distance.
 const PATIENCE_SHARE: f32 = 2.5;
 
@@ -62,6 +64,7 @@ pub struct Mission {
     flew: bool,
     still_s: f32,
     over_pad_s: f32,
+    grounded_s: f32,
 }
 
 impl Mission {
@@ -79,6 +82,7 @@ impl Mission {
             flew: false,
             still_s: 0.0,
             over_pad_s: 0.0,
+            grounded_s: 0.0,
         }
     }
 
@@ -128,10 +132,16 @@ impl Mission {
         self.phase
     }
 
-    /// Whether the pilot flies navigation's wishes now or is about to.
+    /// Whether the drone is in the air under the pilot's control.
     #[must_use]
     pub fn airborne(&self) -> bool {
         matches!(self.phase, Phase::Hover | Phase::Autonomous)
+    }
+
+    /// Whether the pilot flies navigation's wishes now.
+    fn heeded(&self) -> bool {
+        self.phase == Phase::Autonomous
+            && matches!(self.failsafe, FailsafeAction::None | FailsafeAction::Return)
     }
 
     fn under_way(&self) -> bool {
@@ -255,6 +265,20 @@ impl Mission {
             return Ok(Some(Event::Plan));
         }
         Ok(None)
+    }
+
+    /// Gives up a mission whose take-off never comes; true when it just did.
+    pub fn waited_on_the_ground(&mut self, dt_s: f32) -> bool {
+        if self.phase != Phase::Grounded || self.flew || !self.under_way() {
+            self.grounded_s = 0.0;
+            return false;
+        }
+        self.grounded_s += dt_s;
+        if self.grounded_s < TAKE_OFF_S {
+            return false;
+        }
+        self.stop(PatrolState::Idle, None);
+        true
     }
 
     /// The planner has a route.

@@ -1,3 +1,5 @@
 //! The pilot process.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    runtime::main::<pilot::Pilot>(runtime::NoDevices)
+}

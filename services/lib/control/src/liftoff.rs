@@ -87,6 +87,11 @@ impl SpoolUp {
         Self { config, guess_us, throttle_us: IDLE_US, at_most_s: 0.0, first: None, lifted: None }
     }
 
+    /// Goes on in the middle of a spool-up: from the throttle that is reached quickly.
+    pub fn resume(&mut self) {
+        self.throttle_us = IDLE_US + self.config.quick_share * (self.guess_us - IDLE_US);
+    }
+
     /// Takes a height of the skids by the down sonar: two in a row off the ground are a lift-off.
     pub fn hear(&mut self, at_ns: u64, height_m: f32) {
         if height_m.is_nan() || height_m < self.config.lifted_m {

@@ -8,7 +8,7 @@ mod track;
 pub use track::{CloseCall, Track};
 
 use crate::score::{Coverage, FlightReport};
-use crate::world::{Ground, Role, Shape, Solid, Surface, World, rectangles};
+use crate::world::{FLIGHT_BAND_M, Ground, Role, Shape, Solid, Surface, World, rectangles};
 use page::{Page, escaped};
 use std::fmt::Write;
 
@@ -44,9 +44,6 @@ const BELIEVED: &str = "#e8590c";
 const PERSON: &str = "#8a3ab9";
 const CALL: &str = "#d6001c";
 const PAD: &str = "#11733a";
-
-/// What stands lower than this is flown over, metres.
-const FLOWN_OVER_M: f32 = 1.0;
 
 impl Picture<'_> {
     /// The picture as SVG text.
@@ -130,7 +127,7 @@ impl Picture<'_> {
             let colour = match top.surface {
                 Surface::Soft => SOFT,
                 Surface::Mirror => MIRROR,
-                Surface::Hard if top.top < FLOWN_OVER_M => LOW,
+                Surface::Hard if top.top <= FLIGHT_BAND_M.0 => LOW,
                 Surface::Hard => HIGH,
             };
             let style = format!("fill=\"{colour}\" stroke=\"#7a5a1c\" stroke-width=\"0.8\"");

@@ -44,6 +44,7 @@ pub struct Track {
 impl Track {
     /// Takes one look, at 10 Hz or faster while the drone is in the air. `clearance` is of that moment;
     /// the world is asked what was near only when it was close.
+    #[expect(clippy::too_many_arguments, reason = "one look has as many sides")]
     pub fn observe(
         &mut self,
         world: &World,
@@ -52,6 +53,7 @@ impl Track {
         estimate: Option<(f32, f32)>,
         clearance: f32,
         body: (f32, f32, f32),
+        people: impl IntoIterator<Item = (f32, f32)>,
     ) {
         push_apart(&mut self.flown, place);
         match (estimate, self.believed.last()) {
@@ -60,10 +62,11 @@ impl Track {
             (Some(next), _) => self.believed.push(Some(next)),
             (None, _) => {}
         }
-        let people = world.people().people();
-        self.people.resize(self.people.len().max(people.len()), Vec::new());
-        for (path, person) in self.people.iter_mut().zip(people) {
-            push_apart(path, person.place());
+        for (index, person) in people.into_iter().enumerate() {
+            if self.people.len() <= index {
+                self.people.push(Vec::new());
+            }
+            push_apart(&mut self.people[index], person);
         }
         let nearer = self.open.as_ref().is_none_or(|call| clearance < call.clearance);
         if clearance < CLOSE_M && nearer {

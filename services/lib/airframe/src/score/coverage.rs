@@ -2,6 +2,7 @@
 //! that the disc + 0.15 m can reach from the pad, the fraction that came so near the drone.
 
 use super::sight::Sight;
+use crate::world::field::squared_distances;
 use crate::world::{FLIGHT_BAND_M, World};
 
 /// What counts as seen lies within this distance, metres.
@@ -59,6 +60,8 @@ impl Coverage {
         let reach = (SEEN_M / ground.resolution()).floor() as i32;
         // Sight goes over cells that nothing stands on: a shut room holds nothing that can be seen.
         let open = ground.flood(pad.x, pad.y, |cell| !ground.blocks_sight(cell));
+        let near = squared_distances(width, ground.height(), |cell| reachable[cell]);
+        let limit = (reach * reach) as f32;
         let mut sight = Sight::default();
         let mut wanted = vec![false; count];
         for cell in 0..count {
@@ -66,11 +69,17 @@ impl Coverage {
                 continue;
             }
             let mut found = reachable[cell];
-            if !found && touches(&open, width, cell) {
-                sight.scan(ground, cell % width, cell / width, reach, |other| {
-                    found |= reachable[other];
-                    !found
-                });
+            if !found && near[cell] <= limit && touches(&open, width, cell) {
+                // Almost always the nearest reachable place is in sight: a short look first.
+                let short = (near[cell].sqrt() as i32 + 4).min(reach);
+                for look in [short, reach] {
+                    if !found {
+                        sight.scan(ground, cell % width, cell / width, look, |other| {
+                            found |= reachable[other];
+                            !found
+                        });
+                    }
+                }
             }
             wanted[cell] = found;
         }

@@ -114,7 +114,6 @@ pub struct World {
     solid_index: Index,
     edges: Vec<Edge>,
     edge_index: Index,
-    /// Cylinders among the solids: their nearest line is where they answer.
     objects: Vec<Object>,
     doors: Vec<DoorPlace>,
     ground: Ground,

@@ -228,3 +228,47 @@ fn a_start_away_from_the_pad_is_free_and_reachable() {
         assert!(world.still_clearance(start.x, start.y, 0.0, 0.3, 0.35) >= 0.0);
     }
 }
+
+/// The worlds that are shipped, on the plans that are shipped.
+fn shipped(name: &str, seed: u64) -> World {
+    macro_rules! files {
+        ($($known:literal),*) => {
+            match name {
+                $($known => (
+                    &include_bytes!(concat!("../../../../../deploy/plans/", $known, ".yaml"))[..],
+                    &include_bytes!(concat!("../../../../../deploy/plans/", $known, ".png"))[..],
+                    &include_bytes!(concat!("../../../../../deploy/plans/", $known, ".rooms.yaml"))[..],
+                    include_str!(concat!("../../../../../deploy/worlds/", $known, ".toml")),
+                ),)*
+                other => panic!("no such world: {other}"),
+            }
+        };
+    }
+    let (header, image, side, world) = files!("demo", "hall", "two-rooms");
+    let header = floorplan::PlanHeader::parse(name, header).expect("a header");
+    let plan = Plan::load(name, &header, image).expect("a plan");
+    let side = Sidecar::parse(name, side).expect("a side file");
+    let file = WorldFile::parse(name, world).expect("a world file");
+    World::build(&plan, &side, &file, ClutterLevel::Full, seed).expect("a world")
+}
+
+#[test]
+fn the_shipped_worlds_stand_up_and_leave_room_to_fly() {
+    for (name, least_m2) in [("demo", 100.0), ("hall", 20.0), ("two-rooms", 10.0)] {
+        for seed in 1..=6 {
+            let world = shipped(name, seed);
+            let coverage = crate::score::Coverage::new(&world, 0.225);
+            let cells = coverage.reachable().iter().filter(|r| **r).count() as f32;
+            let area = cells * world.ground().resolution().powi(2);
+            assert!(area > least_m2, "{name}, seed {seed}: {area} m2");
+            let furniture: Vec<_> =
+                world.objects().iter().filter(|o| o.outline.role == Role::Furniture).collect();
+            for object in &furniture {
+                for wall in world.solids().iter().filter(|s| s.role == Role::Wall) {
+                    let depth = wall.outline_distance(object.outline.x, object.outline.y);
+                    assert!(depth > 0.0, "{} stands in a wall", object.name);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,443 @@
+//! Everything but the ports: from places, echoes, commands and the pilot's state to a setpoint.
+
+use crate::blockage::{Blockage, Verdict};
+use crate::config::NavigationConfig;
+use crate::journey::{Atlas, Journey, Work};
+use crate::mission::{Event, Goal, Intent, Mission, Nonsense};
+use crate::place::Place;
+use crate::senses::Senses;
+use crate::steer::{Craft, Scene, Steer, Steering};
+use avoid::grid::{insert, scroll};
+use avoid::{CELL_M, CELLS, GridRules, Histogram, SIDE, WallLayer, Window};
+use core::fmt::Write;
+use floorplan::{Cell, DistanceField};
+use ipc_types::{
+    Command, Grid, Patrol, PatrolState, PilotState, Polar, Pose, Setpoint, SetpointKind, SonarRanges, SteeringReason,
+    Text, nanoseconds, seconds_between,
+};
+use std::sync::Arc;
+
+/// Slower wishes are a hover at the place where the drone stands: a velocity of nothing drifts.
+const STANDING_M_S: f32 = 0.03;
+/// The route ends this near to its last point, metres: the hold of the hover does the rest.
+const ARRIVED_M: f32 = 0.3;
+/// Cells of the plan nearer to a wall than this are stamped as wall, metres.
+const WALL_SKIN_M: f32 = 0.02;
+/// Beams kept for the grid between two decisions: two sweeps of a full set of sonars.
+const MAX_BEAMS: usize = 64;
+
+/// Navigation without its ports.
+#[derive(Debug)]
+pub struct Core {
+    config: NavigationConfig,
+    atlas: Arc<Atlas>,
+    place: Option<Place>,
+    senses: Senses,
+    beams: Vec<avoid::Beam>,
+    rules: GridRules,
+    walls: WallLayer,
+    steering: Steering,
+    blockage: Blockage,
+    mission: Mission,
+    journey: Journey,
+    stand: Option<(f32, f32)>,
+    last_ns: Option<u64>,
+    text: Text<128>,
+    refused: u64,
+}
+
+impl Core {
+    /// Over a building, for a vehicle.
+    ///
+    /// # Errors
+    /// A vehicle that the histogram cannot be made for.
+    pub fn new(config: NavigationConfig, craft: Craft, atlas: Arc<Atlas>) -> Result<Self, avoid::ConfigError> {
+        Ok(Self {
+            steering: Steering::new(craft)?,
+            mission: Mission::new(atlas.pad()),
+            journey: Journey::new(Arc::clone(&atlas), craft, config.tries),
+            config,
+            atlas,
+            place: None,
+            senses: Senses::default(),
+            beams: Vec::with_capacity(MAX_BEAMS),
+            rules: GridRules::default(),
+            walls: WallLayer::new(),
+            blockage: Blockage::default(),
+            stand: None,
+            last_ns: None,
+            text: Text::new("waiting for a command"),
+            refused: 0,
+        })
+    }
+
+    /// Messages refused since start.
+    #[must_use]
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// One sentence: what is being done and why.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        self.text.as_str()
+    }
+
+    /// Where the round stands.
+    #[must_use]
+    pub fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
+    /// The route and what was seen.
+    #[must_use]
+    pub fn journey(&self) -> &Journey {
+        &self.journey
+    }
+
+    /// After a restart: goes on with the round that the keeper holds, if it is for this plan.
+    pub fn resume(&mut self, patrol: &Patrol) {
+        match self.journey.restore(patrol) {
+            Ok((state, there)) => {
+                self.mission.restore(state, (patrol.pad_x_m, patrol.pad_y_m), there, patrol.command_sequence);
+            }
+            Err(Nonsense) => self.refused += 1,
+        }
+    }
+
+    /// A new estimate.
+    pub fn pose(&mut self, pose: &Pose) {
+        match Place::of(pose, self.place.as_ref()) {
+            Some(place) => self.place = Some(place),
+            None => self.refused += 1,
+        }
+    }
+
+    /// Echoes: kept until the next decision.
+    pub fn ranges(&mut self, ranges: &SonarRanges) {
+        if ranges.count as usize > ranges.readings.len() {
+            self.refused += 1;
+            return;
+        }
+        let Some(place) = &self.place else {
+            return;
+        };
+        for reading in ranges.filled() {
+            if let Some(beam) = self.senses.take(reading, place, self.atlas.plan())
+                && self.beams.len() < MAX_BEAMS
+            {
+                self.beams.push(beam);
+            }
+        }
+    }
+
+    /// The pilot's state.
+    pub fn pilot(&mut self, pilot: &PilotState) {
+        let heard = self.mission.hear(pilot, self.place.as_ref());
+        self.act(heard);
+    }
+
+    /// An operator's command.
+    pub fn command(&mut self, command: &Command) {
+        let obeyed = self.mission.obey(command, self.place.as_ref());
+        self.act(obeyed);
+    }
+
+    fn act(&mut self, event: Result<Option<Event>, Nonsense>) {
+        match event {
+            Ok(None) => return,
+            Ok(Some(Event::NewRound)) => {
+                self.journey.new_round();
+                self.journey.plan();
+            }
+            Ok(Some(Event::Plan)) => self.journey.plan(),
+            Ok(Some(Event::Drop)) => self.journey.drop_route(),
+            Err(Nonsense) => {
+                self.refused += 1;
+                return;
+            }
+        }
+        self.steering.forget();
+        self.blockage.reset();
+        self.stand = None;
+    }
+
+    /// The pose, if it may be flown by.
+    fn fresh_place(&self, now: u64) -> Option<Place> {
+        self.place
+            .filter(|place| place.age_s(now) <= self.config.pose_age_s && place.age_s(now) > -1.0)
+            .map(|place| place.at(now))
+    }
+
+    /// Moves the grid under the drone and enters the echoes. `last` is the grid published before. False
+    /// when there is no pose to put it around; then `next` is not to be sent.
+    pub fn map(&mut self, now: u64, last: Option<&Grid>, next: &mut Grid) -> bool {
+        let Some(window) = self.fresh_place(now).and_then(|place| Window::around(place.x, place.y)) else {
+            self.beams.clear();
+            return false;
+        };
+        let known = last
+            .filter(|grid| (grid.cell_m - CELL_M).abs() < 1e-6 && grid.header.stamp_ns <= now)
+            .and_then(|grid| Window::from_origin(grid.origin_x_m, grid.origin_y_m).map(|from| (grid, from)));
+        match known {
+            Some((grid, from)) => {
+                let faded = self.rules.faded(grid.header.stamp_ns, now);
+                scroll(&grid.cells, &from, &mut next.cells, &window, faded);
+            }
+            None => next.cells.fill(0),
+        }
+        (next.origin_x_m, next.origin_y_m) = window.origin();
+        next.cell_m = CELL_M;
+        next.reserved = [0; 11];
+        for beam in self.beams.drain(..) {
+            insert(&mut next.cells, &window, &self.rules, &beam);
+        }
+        true
+    }
+
+    /// One decision. `cells` and its window are the grid just made, empty when there is none.
+    pub fn decide(&mut self, now: u64, grid: Option<&Grid>, polar: &mut Polar) -> Setpoint {
+        let dt_s = self.last_ns.map_or(0.0, |last| seconds_between(last, now).clamp(0.0, 0.5)) as f32;
+        self.last_ns = Some(now);
+        let place = self.fresh_place(now);
+        if self.mission.waited_on_the_ground(dt_s) {
+            self.journey.drop_route();
+        }
+        if let Some(place) = &place {
+            self.journey.see(place, now);
+            self.plan_on(place);
+        }
+        let hearing = self.senses.fresh(now, self.config.ranges_age_s);
+        let planned = self.journey.planned();
+        let intent = self.mission.intent(place.as_ref(), planned, self.config.pad_m, dt_s);
+        let window = grid.and_then(|grid| Window::from_origin(grid.origin_x_m, grid.origin_y_m));
+        let (steer, setpoint) = match (place, grid, window) {
+            (Some(place), Some(grid), Some(window)) => {
+                let setpoint = self.setpoint(now, &place, intent);
+                let follow = intent == Intent::Follow && hearing && place.tracking;
+                let steer = self.steer(now, dt_s, &place, grid, window, follow, polar);
+                let setpoint = if follow {
+                    self.follow(dt_s, &place, grid, window, &steer, setpoint)
+                } else {
+                    self.steering.forget();
+                    setpoint
+                };
+                (Some((steer, hearing && place.tracking)), setpoint)
+            }
+            _ => (None, blank_setpoint(now, &self.config)),
+        };
+        write_polar(polar, steer.as_ref().map(|(steer, seeing)| (steer, *seeing)));
+        self.say(intent, steer.is_some_and(|(_, seeing)| seeing));
+        setpoint
+    }
+
+    /// Works one slice of a route that is being planned.
+    fn plan_on(&mut self, place: &Place) {
+        match self.journey.work(self.mission.goal(), place, self.mission.pad()) {
+            Work::Ready => {
+                self.mission.route_ready();
+                self.blockage.reset();
+                self.steering.forget();
+            }
+            Work::NoWay => self.mission.no_way(Some(place)),
+            Work::Idle | Work::Busy => {}
+        }
+    }
+
+    fn steer(
+        &mut self,
+        now: u64,
+        dt_s: f32,
+        place: &Place,
+        grid: &Grid,
+        window: Window,
+        follow: bool,
+        polar: &mut Polar,
+    ) -> Steer {
+        let (plan, field) = (self.atlas.plan(), self.atlas.field());
+        self.walls.follow(&window, |x, y| {
+            plan.cell_at(x, y) != Cell::Free || field.distance(x, y) < WALL_SKIN_M
+        });
+        let aim = if follow {
+            self.journey.advance(place);
+            self.steering.aim(&self.config, field, place, self.journey.track())
+        } else {
+            None
+        };
+        let scene = Scene {
+            now,
+            place: *place,
+            window,
+            cells: &grid.cells,
+            walls: self.walls.cells(),
+            field,
+            senses: &self.senses,
+            dt_s,
+        };
+        let mut histogram =
+            Histogram { raw: &mut polar.raw, smoothed: &mut polar.smoothed, blocked: &mut polar.blocked };
+        self.steering.step(&self.config, &scene, aim, &mut histogram)
+    }
+
+    /// Turns what steering wishes into a setpoint, and looks after blocked ways and the end of the route.
+    fn follow(
+        &mut self,
+        dt_s: f32,
+        place: &Place,
+        grid: &Grid,
+        window: Window,
+        steer: &Steer,
+        mut setpoint: Setpoint,
+    ) -> Setpoint {
+        let blocked = steer.reason == SteeringReason::Blocked;
+        let along = self.journey.track().along();
+        let config = &self.config;
+        match self.blockage.watch(dt_s, blocked, along, config.wait_s, config.stuck_s) {
+            Verdict::Go | Verdict::Wait => {}
+            verdict @ (Verdict::Blocked | Verdict::Stuck) => {
+                self.journey.obstruct(place, steer.target, &grid.cells, &window, verdict == Verdict::Blocked);
+                self.journey.plan();
+                self.mission.replanning(place);
+                self.blockage.reset();
+                self.steering.forget();
+                return setpoint;
+            }
+        }
+        if self.journey.homeward() {
+            self.mission.homeward();
+        }
+        if self.journey.track().remaining() < ARRIVED_M
+            && self.journey.track().end().is_some_and(|end| place.distance(end) < ARRIVED_M + 0.1)
+        {
+            self.mission.arrived();
+            self.journey.drop_route();
+            self.steering.forget();
+            return setpoint;
+        }
+        setpoint.heading_rad = steer.heading;
+        let (vx, vy) = steer.velocity;
+        if vx.hypot(vy) < STANDING_M_S {
+            let (x, y) = *self.stand.get_or_insert((place.x, place.y));
+            (setpoint.hold_x_m, setpoint.hold_y_m) = (x, y);
+        } else {
+            self.stand = None;
+            setpoint.kind = u32::from(SetpointKind::Velocity.code());
+            (setpoint.velocity_x_m_s, setpoint.velocity_y_m_s) = (vx, vy);
+            (setpoint.hold_x_m, setpoint.hold_y_m) = (f32::NAN, f32::NAN);
+        }
+        setpoint
+    }
+
+    /// The setpoint of an intent, before steering has its say.
+    fn setpoint(&mut self, now: u64, place: &Place, intent: Intent) -> Setpoint {
+        let mut setpoint = blank_setpoint(now, &self.config);
+        let hold = match intent {
+            Intent::Hover(hold) => hold,
+            Intent::Follow => Some((place.x, place.y)),
+            Intent::Land(pad) => {
+                setpoint.kind = u32::from(SetpointKind::Land.code());
+                Some(pad)
+            }
+        };
+        if intent != Intent::Follow {
+            self.stand = None;
+        }
+        if let Some((x, y)) = hold {
+            (setpoint.hold_x_m, setpoint.hold_y_m) = (x, y);
+        }
+        setpoint
+    }
+
+    /// Says in one sentence what is being done and why.
+    fn say(&mut self, intent: Intent, seeing: bool) {
+        let mut text = Text::<128>::default();
+        let state = self.mission.state();
+        let journey = &self.journey;
+        // What does not fit is cut at the end, where it matters least.
+        let _ = match (state, intent) {
+            (PatrolState::Idle, _) => write!(text, "waiting for a command"),
+            (PatrolState::Done, _) => write!(text, "the round is flown and the drone has landed"),
+            (PatrolState::Failed, _) => write!(text, "gave up: {}", journey.trouble()),
+            (PatrolState::Paused, _) => write!(text, "paused: waiting for the operator"),
+            (PatrolState::Landing, Intent::Land(_)) => write!(text, "landing on the pad"),
+            (PatrolState::Landing, _) => write!(text, "coming to rest over the pad"),
+            (_, Intent::Follow) if !seeing => write!(text, "standing: no fresh pose or ranges"),
+            (_, Intent::Follow) => {
+                let _ = match self.mission.goal() {
+                    Goal::There((x, y)) => write!(text, "flying to {x:.1}, {y:.1}"),
+                    Goal::Home => write!(text, "flying home"),
+                    _ => journey.write_errand(&mut text),
+                };
+                self.write_steering(&mut text)
+            }
+            _ if !journey.planned() => write!(text, "working out the route"),
+            _ if !self.mission.airborne() => write!(text, "ready: waiting for the take-off"),
+            _ => write!(text, "standing: the pilot is flying on its own"),
+        };
+        self.text = text;
+    }
+
+    fn write_steering(&self, text: &mut Text<128>) -> core::fmt::Result {
+        if self.blockage.waiting() {
+            write!(text, ": something stands in the way, waiting for it to move on")
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Fills the retained message.
+    pub fn write_patrol(&self, patrol: &mut Patrol) {
+        self.journey.write(patrol);
+        patrol.state = u32::from(self.mission.state().code());
+        (patrol.pad_x_m, patrol.pad_y_m) = self.mission.pad().unwrap_or((f32::NAN, f32::NAN));
+        patrol.command_sequence = self.mission.command();
+        patrol.text = self.text;
+    }
+}
+
+/// Standing where it is, at the height of the round.
+fn blank_setpoint(now: u64, config: &NavigationConfig) -> Setpoint {
+    Setpoint {
+        expiry_ns: now.saturating_add(nanoseconds(f64::from(config.expiry_s))),
+        heading_rad: f32::NAN,
+        height_m: config.height_m,
+        hold_x_m: f32::NAN,
+        hold_y_m: f32::NAN,
+        kind: u32::from(SetpointKind::Hover.code()),
+        ..Setpoint::default()
+    }
+}
+
+/// Fills what the histogram did not; without a decision everything.
+fn write_polar(polar: &mut Polar, steer: Option<(&Steer, bool)>) {
+    polar.reserved = 0;
+    let Some((steer, seeing)) = steer else {
+        polar.raw.fill(0.0);
+        polar.smoothed.fill(0.0);
+        polar.blocked.fill(0);
+        (polar.threshold_high, polar.threshold_low) = (f32::NAN, f32::NAN);
+        (polar.target_rad, polar.chosen_rad, polar.speed_m_s) = (f32::NAN, f32::NAN, 0.0);
+        (polar.valley_first, polar.valley_last) = (255, 255);
+        polar.reason = SteeringReason::Blind.code();
+        return;
+    };
+    polar.threshold_high = steer.decision.threshold_high;
+    polar.threshold_low = steer.decision.threshold_low;
+    polar.target_rad = steer.target;
+    polar.chosen_rad = steer.direction;
+    polar.speed_m_s = steer.velocity.0.hypot(steer.velocity.1);
+    (polar.valley_first, polar.valley_last) = steer.decision.valley.unwrap_or((255, 255));
+    polar.reason = if seeing { steer.reason } else { SteeringReason::Blind }.code();
+}
+
+// The grid message holds exactly the window that the algorithms work on.
+const _: () = assert!(CELLS == ipc_types::GRID_CELLS && SIDE == ipc_types::GRID_SIDE);
+
+/// Distance field for steering: what is not free on the plan, farther than this is open, metres.
+pub const FIELD_M: f32 = 2.0;
+
+/// The field that steering wants of a plan.
+#[must_use]
+pub fn steering_field(plan: &floorplan::Plan) -> DistanceField {
+    DistanceField::of_not_free(plan, FIELD_M)
+}

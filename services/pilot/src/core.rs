@@ -1,0 +1,398 @@
+//! The pilot without ports.
+
+use crate::config::PilotConfig;
+use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, age_s};
+use control::{
+    ClimbController, Echo, Footing, HeightEstimator, Held, Judgement, Look, Motion, Shield, SpoolUp, Tilt,
+    TouchDown, Vector, VelocityController, WayHome, wrap_angle,
+};
+use floorplan::{DistanceField, Plan};
+use ipc_types::{
+    Attitude, ChannelSource, FlightState, Patrol, PatrolState, Phase, Pose, Power, Setpoint, SonarHealth,
+    SonarRanges, SonarStatus, Text,
+};
+use std::sync::Arc;
+
+/// Speed of sound at 20 C, m/s, to place an echo in time.
+const SOUND_M_S: f32 = 343.0;
+
+/// What the pilot must know about the aircraft.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Craft {
+    /// Radius of the disc, metres.
+    pub radius_m: f32,
+    /// Side sonars: index, azimuth of the axis, position of the face (body frame).
+    pub sides: Vec<(usize, f32, Vector)>,
+    /// Whether there is a down sonar.
+    pub has_down: bool,
+    /// What the down sonar should read on the ground, metres.
+    pub rest_m: f32,
+    /// Throttle that should hover, microseconds.
+    pub hover_us: f32,
+    /// Cells in series.
+    pub cells: u32,
+    /// Charge of a full battery, milliampere-hours.
+    pub capacity_mah: f32,
+    /// Speed in the open, m/s.
+    pub cruise_m_s: f32,
+    /// Most tilt, radians.
+    pub max_tilt_rad: f32,
+}
+
+/// The level that the controller's attitude showed on the ground, averaged.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct GroundLevel {
+    pub(crate) tilt: Tilt,
+    pub(crate) seen: u32,
+}
+
+/// Timers of the failsafe table.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Timers {
+    pub(crate) navigation: Held,
+    pub(crate) side: Held,
+    pub(crate) all_sides: Held,
+    pub(crate) pose: Held,
+    pub(crate) walls: Held,
+    pub(crate) home: Held,
+    pub(crate) low: Held,
+    pub(crate) empty: Held,
+    pub(crate) link: Held,
+    pub(crate) tilt: Held,
+    pub(crate) disarmed: Held,
+}
+
+/// What was decided in the last step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Decided {
+    pub(crate) arm: bool,
+    pub(crate) source: ChannelSource,
+    pub(crate) roll_us: f32,
+    pub(crate) pitch_us: f32,
+    pub(crate) throttle_us: f32,
+    pub(crate) yaw_us: f32,
+    pub(crate) shield_speed_m_s: f32,
+}
+
+impl Decided {
+    pub(crate) const NEUTRAL: Self = Self {
+        arm: false,
+        source: ChannelSource::Neutral,
+        roll_us: 1500.0,
+        pitch_us: 1500.0,
+        throttle_us: 1000.0,
+        yaw_us: 1500.0,
+        shield_speed_m_s: 0.0,
+    };
+}
+
+/// The pilot: messages in, channels and state out. Steps allocate nothing.
+#[derive(Debug)]
+pub struct PilotCore {
+    pub(crate) config: PilotConfig,
+    pub(crate) craft: Craft,
+    pub(crate) walls: Option<Arc<DistanceField>>,
+    pub(crate) way_home: Option<WayHome>,
+
+    pub(crate) attitude: AttitudeSeen,
+    pub(crate) pose: PoseSeen,
+    pub(crate) flight: FlightSeen,
+    pub(crate) setpoint: Option<SetpointSeen>,
+    pub(crate) down: DownSeen,
+    pub(crate) ground: GroundLevel,
+    pub(crate) refused: u64,
+
+    pub(crate) height: HeightEstimator,
+    pub(crate) climb: ClimbController,
+    pub(crate) motion: Motion,
+    pub(crate) velocity: VelocityController,
+    pub(crate) shield: Shield,
+    pub(crate) spool: Option<SpoolUp>,
+    pub(crate) touch: TouchDown,
+
+    pub(crate) phase: Phase,
+    pub(crate) phase_since_ns: u64,
+    pub(crate) after_take_off: Phase,
+    pub(crate) hold: Option<Vector>,
+    pub(crate) hold_heading: Option<f32>,
+    pub(crate) height_wish_m: f32,
+    pub(crate) trim: Tilt,
+    pub(crate) hover_known: bool,
+    pub(crate) settled: bool,
+    pub(crate) operator_land: bool,
+    pub(crate) blind_since_ns: Option<u64>,
+    pub(crate) aside_s: f32,
+
+    pub(crate) timers: Timers,
+    pub(crate) judged: Judgement,
+    pub(crate) failsafe_since_ns: u64,
+    pub(crate) decided: Decided,
+    pub(crate) last_step_ns: Option<u64>,
+    pub(crate) command_sequence: u32,
+    pub(crate) changed: bool,
+    pub(crate) text: Text<96>,
+}
+
+impl PilotCore {
+    /// On the ground, with motors off. `plan` gives the walls that the shield respects.
+    #[must_use]
+    pub fn new(config: PilotConfig, craft: Craft, plan: Option<(&Plan, Arc<DistanceField>)>) -> Self {
+        let way_home = plan.as_ref().map(|(plan, walls)| {
+            let origin = Vector::new(plan.origin().0, plan.origin().1);
+            let size = Vector::new(plan.width() as f32, plan.height() as f32) * plan.resolution();
+            WayHome::new(walls, origin, size, craft.radius_m + 0.05)
+        });
+        let hover_us = if config.take_off.hover_us > 0.0 { config.take_off.hover_us } else { craft.hover_us };
+        let mut velocity = config.velocity;
+        velocity.max_tilt_deg = velocity.max_tilt_deg.min(craft.max_tilt_rad.to_degrees());
+        Self {
+            walls: plan.map(|(_, walls)| walls),
+            way_home,
+            attitude: AttitudeSeen::default(),
+            pose: PoseSeen::default(),
+            flight: FlightSeen::default(),
+            setpoint: None,
+            down: DownSeen::default(),
+            ground: GroundLevel::default(),
+            refused: 0,
+            height: HeightEstimator::new(config.height, craft.rest_m),
+            climb: ClimbController::new(config.climb, hover_us),
+            motion: Motion::new(config.motion),
+            velocity: VelocityController::new(velocity),
+            shield: Shield::new(config.shield, craft.radius_m, craft.sides.iter().copied()),
+            spool: None,
+            touch: TouchDown::default(),
+            phase: Phase::Grounded,
+            phase_since_ns: 0,
+            after_take_off: Phase::Hover,
+            hold: None,
+            hold_heading: None,
+            height_wish_m: config.height_m,
+            trim: Tilt::default(),
+            hover_known: false,
+            settled: false,
+            operator_land: false,
+            blind_since_ns: None,
+            aside_s: 0.0,
+            timers: Timers::default(),
+            judged: Judgement { causes: 0, cause: control::Cause::None, action: control::Action::None },
+            failsafe_since_ns: 0,
+            decided: Decided::NEUTRAL,
+            last_step_ns: None,
+            command_sequence: 0,
+            changed: true,
+            text: Text::new("on the ground"),
+            config,
+            craft,
+        }
+    }
+
+    /// Takes an attitude.
+    pub fn attitude(&mut self, message: &Attitude) {
+        if !self.attitude.take(message) {
+            self.refused += 1;
+            return;
+        }
+        if self.phase == Phase::Grounded && !self.flight.armed {
+            // On the ground gravity is all that the controller's accelerometer feels: about a second's mean.
+            let share = if self.ground.seen == 0 { 1.0 } else { 0.03 };
+            self.ground.seen = self.ground.seen.saturating_add(1);
+            let (old, new) = (self.ground.tilt, self.attitude.tilt);
+            self.ground.tilt = Tilt {
+                roll: old.roll + share * (new.roll - old.roll),
+                pitch: old.pitch + share * (new.pitch - old.pitch),
+            };
+        }
+    }
+
+    /// Takes a pose.
+    pub fn pose(&mut self, message: &Pose) {
+        match self.pose.take(message) {
+            Some((at, place, velocity)) => self.motion.correct(at, place, velocity),
+            None => self.refused += 1,
+        }
+    }
+
+    /// Takes what the controller and its link are doing.
+    pub fn flight_state(&mut self, message: &FlightState) {
+        if !self.flight.take_state(message) {
+            self.refused += 1;
+        }
+    }
+
+    /// Takes the battery.
+    pub fn power(&mut self, message: &Power) {
+        self.flight.take_power(message, self.craft.cells);
+    }
+
+    /// Takes a setpoint of navigation.
+    pub fn setpoint(&mut self, message: &Setpoint) {
+        match SetpointSeen::read(message) {
+            Some(setpoint) => self.setpoint = Some(setpoint),
+            None => self.refused += 1,
+        }
+    }
+
+    /// Takes the pad from navigation's round, to know the way home.
+    pub fn patrol(&mut self, message: &Patrol) {
+        let known = u8::try_from(message.state).ok().and_then(PatrolState::from_code);
+        let pad = Vector::new(message.pad_x_m, message.pad_y_m);
+        if known.is_some_and(|state| state != PatrolState::Idle) && pad.is_finite() {
+            self.set_home(pad);
+        }
+    }
+
+    pub(crate) fn set_home(&mut self, home: Vector) {
+        if let Some(way) = &mut self.way_home
+            && way.home().is_none_or(|known| (known - home).norm() > 0.3)
+        {
+            way.set_home(home);
+        }
+    }
+
+    /// Takes a ping group.
+    pub fn ranges(&mut self, message: &SonarRanges) {
+        if message.count as usize > ipc_types::MAX_SONARS {
+            self.refused += 1;
+            return;
+        }
+        self.shield.set_sweep(message.sweep_s);
+        for reading in message.filled() {
+            let (Some(status), Some(health)) =
+                (SonarStatus::from_code(reading.status), SonarHealth::from_code(reading.health))
+            else {
+                self.refused += 1;
+                continue;
+            };
+            let good = health == SonarHealth::Good && status != SonarStatus::Fault;
+            if reading.looks_down() {
+                self.down.ping_ns = Some(reading.ping_ns);
+                self.down.good = good;
+                self.down.range_m = reading.range().filter(|_| good);
+                if let Some(range) = self.down.range_m {
+                    self.hear_ground(reading.ping_ns, range);
+                }
+            } else if good {
+                let echo = match status {
+                    SonarStatus::Ok => Echo::Range(reading.range_m),
+                    _ => Echo::Nothing,
+                };
+                let look = Look { at_ns: reading.ping_ns, heading: self.heading(), echo };
+                if !self.shield.hear(usize::from(reading.sensor), look) {
+                    self.refused += 1;
+                }
+            }
+        }
+    }
+
+    fn hear_ground(&mut self, ping_ns: u64, range_m: f32) {
+        let at = ping_ns + (range_m / SOUND_M_S * 1e9) as u64;
+        if let Some(spool) = &mut self.spool {
+            spool.hear(at, range_m - self.height.rest_m());
+        } else if self.airborne() {
+            let tilt = self.tilt().magnitude();
+            self.height.measure(at, range_m, tilt);
+        } else if self.phase == Phase::Grounded {
+            self.down.stand(range_m);
+        }
+    }
+
+    /// Heading on the plan: compass with the localization's offset.
+    pub(crate) fn heading(&self) -> f32 {
+        wrap_angle(self.attitude.yaw + self.pose.heading_offset)
+    }
+
+    /// True tilt as far as it is known: the controller's attitude less its level error. What is old is level.
+    pub(crate) fn tilt(&self) -> Tilt {
+        let fresh = self.last_step_ns.is_none_or(|now| age_s(self.attitude.at, now) < 0.3);
+        if !fresh || self.attitude.at.is_none() {
+            return Tilt::default();
+        }
+        let (seen, level) = (self.attitude.tilt, self.level());
+        Tilt { roll: seen.roll - level.roll, pitch: seen.pitch - level.pitch }
+    }
+
+    /// What the controller's attitude reads when the body is level: by the localization, before its first
+    /// pose by what it read on the ground.
+    pub(crate) fn level(&self) -> Tilt {
+        if self.pose.at.is_some() {
+            return self.pose.level;
+        }
+        let most = 0.05;
+        Tilt {
+            roll: self.ground.tilt.roll.clamp(-most, most),
+            pitch: self.ground.tilt.pitch.clamp(-most, most),
+        }
+    }
+
+    /// Where the drone stands, for the shield.
+    pub(crate) fn footing(&self) -> Footing {
+        let known = self.pose.at.is_some() && self.place_known();
+        Footing {
+            place: known.then(|| self.motion.place()),
+            sigma_m: self.pose.sigma_m,
+            heading: self.heading(),
+        }
+    }
+
+    /// Whether the place may be flown by: tracked, fresh, and within the policy's bounds.
+    pub(crate) fn place_known(&self) -> bool {
+        let policy = &self.config.failsafe;
+        let now = self.last_step_ns.unwrap_or(0);
+        self.pose.state == ipc_types::LocalizationState::Tracking
+            && age_s(self.pose.at, now) <= policy.pose_stale_s
+            && self.pose.p_lost <= policy.p_lost
+            && self.pose.sigma_m <= policy.sigma_m
+    }
+
+    /// The phase of the flight.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Whether the skids are believed to be off the ground.
+    #[must_use]
+    pub fn airborne(&self) -> bool {
+        match self.phase {
+            Phase::Grounded | Phase::Arming | Phase::Cut => false,
+            Phase::TakeOff => self.spool.is_none(),
+            Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing | Phase::EmergencyLanding => true,
+        }
+    }
+
+    /// Messages that made no sense.
+    #[must_use]
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// One sentence for people.
+    #[must_use]
+    pub fn sentence(&self) -> &str {
+        self.text.as_str()
+    }
+
+    /// Says something to people.
+    pub(crate) fn say(&mut self, sentence: &str) {
+        if self.text.as_str() != sentence {
+            self.text.set(sentence);
+            self.changed = true;
+        }
+    }
+
+    /// Goes into a phase.
+    pub(crate) fn enter(&mut self, now: u64, phase: Phase) {
+        if phase != self.phase {
+            self.phase = phase;
+            self.phase_since_ns = now;
+            self.changed = true;
+            self.settled = false;
+            self.aside_s = 0.0;
+        }
+    }
+
+    pub(crate) fn phase_s(&self, now: u64) -> f32 {
+        age_s(Some(self.phase_since_ns), now)
+    }
+}

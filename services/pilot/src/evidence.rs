@@ -1,0 +1,87 @@
+//! From what was heard to the evidence of the failsafe table.
+
+use crate::core::PilotCore;
+use crate::senses::age_s;
+use control::{Action, Evidence, judge};
+use ipc_types::{LinkState, Phase};
+
+/// What comes and goes with single messages must not restart a clock, seconds.
+const CLEAR_S: f32 = 0.5;
+/// Volts under load jump; a battery that recovered for so long has recovered, seconds.
+const CLEAR_VOLTS_S: f32 = 3.0;
+/// Share of the capacity that is never counted on: the last tenth is where a pack collapses.
+const USABLE: f32 = 0.9;
+/// Mean speed of a way home, as a share of cruise: doors, corners and braking.
+const HOME_PACE: f32 = 0.6;
+/// Current of a hover when the controller does not measure it: the whole pack in ten minutes.
+const HOVER_HOURS: f32 = 1.0 / 6.0;
+/// Time of a landing, seconds.
+const LANDING_S: f32 = 15.0;
+
+impl PilotCore {
+    /// Gathers the evidence and judges it.
+    pub(crate) fn judge(&mut self, now: u64) {
+        let before = (self.judged.cause, self.judged.action);
+        let evidence = self.evidence(now);
+        self.judged = judge(&evidence, &self.config.failsafe);
+        if (self.judged.cause, self.judged.action) != before {
+            self.changed = true;
+            self.failsafe_since_ns = if self.judged.action == Action::None { 0 } else { now };
+        }
+    }
+
+    /// For how long what has been so.
+    pub(crate) fn evidence(&mut self, now: u64) -> Evidence {
+        let policy = self.config.failsafe;
+        let fresh_setpoint = self.setpoint.is_some_and(|setpoint| now < setpoint.expiry_ns);
+        let (silent, sides) = self.shield.silent(now);
+        let place_known = self.place_known();
+        let cell = self.flight.cell_volts;
+        let uncovered = self.home_uncovered();
+        let link = age_s(self.flight.at, now) > 1.0 || self.flight.link != LinkState::Up;
+        let tilted = self.tilt().magnitude() > policy.tilt_deg.to_radians();
+        let few_walls = !place_known && self.pose.walls < 2;
+        let airborne = self.airborne();
+        let autonomous = self.phase == Phase::Autonomous;
+        let t = &mut self.timers;
+        Evidence {
+            airborne,
+            autonomous,
+            navigation_silent_s: t.navigation.update(now, autonomous && !fresh_setpoint, 0.0),
+            side_sonar_silent_s: t.side.update(now, silent > 0, CLEAR_S),
+            all_sonars_silent_s: t.all_sides.update(now, sides > 0 && silent == sides, 0.0),
+            pose_uncertain_s: t.pose.update(now, !place_known, CLEAR_S),
+            few_walls_s: t.walls.update(now, few_walls, CLEAR_S),
+            home_uncovered_s: t.home.update(now, uncovered, CLEAR_VOLTS_S),
+            cell_low_s: t.low.update(now, cell < policy.return_volts, CLEAR_VOLTS_S),
+            cell_empty_s: t.empty.update(now, cell < policy.land_volts, CLEAR_S),
+            height_silent_s: if airborne { self.height.silent_s(now) } else { 0.0 },
+            link_silent_s: t.link.update(now, link, 0.2),
+            tilt_s: t.tilt.update(now, tilted, 0.05),
+            operator: self.operator_land.then_some(Action::Land),
+        }
+    }
+
+    /// Whether the charge left does not cover the way home through the corridors and the reserve.
+    fn home_uncovered(&self) -> bool {
+        let Some(way) = &self.way_home else { return false };
+        let drawn = self.flight.drawn_mah;
+        if !drawn.is_finite() || !self.place_known() {
+            return false;
+        }
+        let Some(length) = way.length_m(self.motion.place()) else { return false };
+        let measured = self.flight.amps > 0.5;
+        let amps =
+            if measured { self.flight.amps } else { self.craft.capacity_mah * 1e-3 / HOVER_HOURS };
+        let seconds = length / (HOME_PACE * self.craft.cruise_m_s).max(0.05) + LANDING_S;
+        let needed = amps * 1000.0 * seconds / 3600.0 * (1.0 + self.config.failsafe.home_reserve);
+        USABLE * self.craft.capacity_mah - drawn < needed
+    }
+
+    /// What would happen if this were lost now.
+    pub(crate) fn what_if(&self, change: impl FnOnce(&mut Evidence)) -> Action {
+        let mut evidence = Evidence { airborne: self.airborne(), ..Evidence::default() };
+        change(&mut evidence);
+        judge(&evidence, &self.config.failsafe).action
+    }
+}

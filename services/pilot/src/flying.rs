@@ -1,0 +1,254 @@
+//! One step: from phase and wishes to sticks.
+
+use crate::core::{Decided, PilotCore};
+use crate::phases::BLIND_M_S;
+use crate::senses::age_s;
+use control::{
+    Action, Asking, Source, Tilt, Vector, VerticalWish, arbitrate, hold_velocity, stick,
+    wrap_angle, yaw_rate,
+};
+use ipc_types::{ChannelSource, Phase, SetpointKind};
+
+/// Near the ground tilts stay small, so that no skid touches first: clearance in metres, most tilt in radians.
+const NEAR_GROUND: [(f32, f32); 3] = [(0.06, 0.035), (0.15, 0.07), (0.35, 0.12)];
+/// Most of the level trim with the learned disturbance, radians (5 degrees).
+const MOST_TRIM_RAD: f32 = 0.087;
+/// Time over which the trim that `flight` would hold level with is averaged, seconds.
+const TRIM_S: f32 = 6.0;
+/// Below this clearance the echoes of the side sonars may be the floor: nothing is pushed away from.
+const PUSH_CLEARANCE_M: f32 = 0.35;
+/// Below this clearance a landing learns no hover throttle: the ground carries, by air or by skids.
+const LEARN_CLEARANCE_M: f32 = 0.35;
+/// A velocity that is less certain is not flown by, m/s.
+const MOST_VELOCITY_SIGMA: f32 = 0.6;
+/// A velocity is reckoned on by tilt alone for so long, seconds.
+const RECKON_S: f32 = 1.5;
+/// Growth and fall of the wished height, m/s.
+const HEIGHT_SLEW_M_S: f32 = 0.3;
+
+impl PilotCore {
+    /// One step. [`Self::fills_channels`] tells whether there is something to fly.
+    pub fn step(&mut self, now: u64) {
+        let dt = self.last_step_ns.map_or(0.02, |last| age_s(Some(last), now)).clamp(0.001, 0.1);
+        self.last_step_ns = Some(now);
+        self.adopt(now);
+        self.carry(now, dt);
+        self.judge(now);
+        self.advance(now, dt);
+        self.decided = match self.phase {
+            Phase::Grounded | Phase::Cut => Decided::NEUTRAL,
+            Phase::Arming => Decided { arm: true, source: ChannelSource::Pilot, ..self.levelled(1000.0) },
+            Phase::TakeOff if self.spool.is_some() => {
+                Decided { arm: true, source: ChannelSource::Pilot, ..self.levelled(self.climb.throttle_us()) }
+            }
+            _ => self.fly(now, dt),
+        };
+    }
+
+    /// Carries place, velocity and height to now.
+    fn carry(&mut self, now: u64, dt: f32) {
+        let tilt = self.tilt();
+        if self.airborne() {
+            let acceleration = tilt.acceleration(self.heading()) + self.velocity.disturbance();
+            self.motion.predict(now, acceleration.limited(4.0));
+            let vertical =
+                self.climb.expected_acceleration(dt, tilt.magnitude(), self.height.climb_m_s());
+            self.height.predict(now, vertical);
+        } else {
+            self.motion.predict(now, Vector::ZERO);
+            self.height.set(now, 0.0, 0.0, 0.0);
+        }
+    }
+
+    /// Sticks that hold the body level at a throttle.
+    fn levelled(&self, throttle_us: f32) -> Decided {
+        Decided {
+            roll_us: stick::of_angle(self.trim.roll),
+            pitch_us: stick::of_angle(self.trim.pitch),
+            throttle_us,
+            ..Decided::NEUTRAL
+        }
+    }
+
+    /// The attitude on the ground tells the level error, before the localization can know it.
+    pub(crate) fn seed_level(&mut self) {
+        let level = self.level();
+        if self.ground.seen >= 10 && self.ground.tilt.magnitude() < MOST_TRIM_RAD {
+            let more = Tilt {
+                roll: self.ground.tilt.roll - level.roll,
+                pitch: self.ground.tilt.pitch - level.pitch,
+            };
+            self.velocity.set_disturbance(-more.acceleration(self.heading()));
+            self.trim = self.ground.tilt;
+        } else {
+            self.velocity.set_disturbance(Vector::ZERO);
+            self.trim = level;
+        }
+    }
+
+    /// The horizontal wish (plan frame) and whose it is.
+    fn wish(&mut self, now: u64) -> (Vector, Source) {
+        let setpoint = self.fresh_setpoint(now).filter(|_| self.phase == Phase::Autonomous);
+        let asking = Asking {
+            airborne: true,
+            navigation: setpoint.is_some(),
+            failsafe: self.judged.action,
+        };
+        let source = arbitrate(&asking);
+        let place = self.place_known();
+        if let (Source::Navigation, Some(setpoint)) = (source, setpoint) {
+            if let Some(heading) = setpoint.heading {
+                self.hold_heading = Some(heading);
+            }
+            if let Some(height) = setpoint.height_m {
+                self.height_wish_m = height;
+            }
+            match (setpoint.kind, setpoint.hold) {
+                (SetpointKind::Velocity, _) => {
+                    self.hold = None;
+                    return (setpoint.velocity, source);
+                }
+                (_, Some(hold)) => self.hold = Some(hold),
+                (_, None) => self.settle(),
+            }
+        } else if source == Source::Failsafe && self.phase == Phase::Autonomous {
+            // Standing still where it stopped, not where navigation last wanted it.
+            if self.hold.is_some_and(|hold| (hold - self.motion.place()).norm() > 0.5) {
+                self.hold = None;
+            }
+            self.settle();
+        }
+        let wish = match self.hold {
+            Some(hold) if place => hold_velocity(&self.config.hold, hold, self.motion.place()),
+            _ => Vector::ZERO,
+        };
+        (wish, source)
+    }
+
+    fn fly(&mut self, now: u64, dt: f32) -> Decided {
+        let (wish, source) = self.wish(now);
+        let clearance = self.height.clearance_m();
+        let heading = self.heading();
+        let guarded = self.shield.guard(
+            now,
+            wish.limited(1.5 * self.craft.cruise_m_s),
+            &self.footing(),
+            self.walls.as_deref(),
+            clearance > PUSH_CLEARANCE_M,
+        );
+        // A body that comes down level has no place and no velocity to fly by.
+        let velocity_known = age_s(self.pose.at, now) < RECKON_S
+            && self.pose.velocity_sigma < MOST_VELOCITY_SIGMA
+            && self.judged.action != Action::Descend;
+        let velocity = velocity_known.then(|| self.motion.velocity());
+        let most = NEAR_GROUND
+            .iter()
+            .find(|(height, _)| clearance < *height)
+            .map_or(self.craft.max_tilt_rad, |(_, tilt)| *tilt);
+        let tilt = self.velocity.step(dt, guarded.velocity, velocity, heading, most);
+        let level = self.level();
+        self.learn_trim(dt, level, heading);
+        let bound = |angle: f32| angle.clamp(-MOST_TRIM_RAD - most, MOST_TRIM_RAD + most);
+        let (roll, pitch) = (bound(tilt.roll + level.roll), bound(tilt.pitch + level.pitch));
+
+        let throttle_us = self.throttle(now, dt);
+        let wanted = *self.hold_heading.get_or_insert(heading);
+        let seen = age_s(self.attitude.at, now) < 0.3;
+        let turn = if seen { yaw_rate(&self.config.heading, wanted, heading) } else { 0.0 };
+        Decided {
+            arm: true,
+            source: match source {
+                Source::Neutral => ChannelSource::Neutral,
+                Source::Pilot => ChannelSource::Pilot,
+                Source::Navigation => ChannelSource::Navigation,
+                Source::Failsafe => ChannelSource::Failsafe,
+            },
+            roll_us: stick::of_angle(roll),
+            pitch_us: stick::of_angle(pitch),
+            throttle_us,
+            yaw_us: stick::of_yaw_rate(turn),
+            shield_speed_m_s: guarded.allowed_m_s,
+        }
+    }
+
+    /// The trim that keeps the body where it is: level error and learned disturbance, slowly.
+    fn learn_trim(&mut self, dt: f32, level: Tilt, heading: f32) {
+        let against = Tilt::of_acceleration(-self.velocity.disturbance(), heading);
+        let bound = |angle: f32| angle.clamp(-MOST_TRIM_RAD, MOST_TRIM_RAD);
+        let share = dt / TRIM_S;
+        self.trim.roll += share * (bound(level.roll + against.roll) - self.trim.roll);
+        self.trim.pitch += share * (bound(level.pitch + against.pitch) - self.trim.pitch);
+    }
+
+    fn throttle(&mut self, now: u64, dt: f32) -> f32 {
+        let c = &self.config;
+        let clearance = self.height.clearance_m();
+        let tilt = self.tilt().magnitude();
+        let blind = self.height.silent_s(now) > c.failsafe.height_hold_s;
+        let (wish, learn) = match self.phase {
+            Phase::Landing | Phase::EmergencyLanding => {
+                let off = match self.hold {
+                    Some(hold) if self.place_known() => (hold - self.motion.place()).norm(),
+                    _ => 0.0,
+                };
+                let aside = off > c.landing.aside_m && clearance > c.landing.slow_below_m;
+                let wait = self.phase == Phase::Landing && aside && self.aside_s < c.landing.patience_s;
+                if wait {
+                    self.aside_s += dt;
+                }
+                let rate = if wait {
+                    0.0
+                } else if blind {
+                    -BLIND_M_S
+                } else if clearance < c.landing.slow_below_m {
+                    -c.landing.slow_m_s
+                } else {
+                    -c.landing.descent_m_s
+                };
+                (VerticalWish::Rate(rate), clearance > LEARN_CLEARANCE_M && !blind)
+            }
+            _ if blind => (VerticalWish::Rate(0.0), false),
+            Phase::TakeOff => {
+                let left = c.height_m - self.height.height_m();
+                let rate = (c.climb.height_gain_per_s * left).clamp(-c.take_off.climb_m_s, c.take_off.climb_m_s);
+                (VerticalWish::Rate(rate), true)
+            }
+            _ => {
+                let floor = self.height.surface_m() + c.min_clearance_m;
+                let wish = self.height_wish_m.max(floor).clamp(c.min_clearance_m, c.max_height_m);
+                let now_m = self.height.height_m();
+                let reach = HEIGHT_SLEW_M_S / c.climb.height_gain_per_s;
+                (VerticalWish::Height(wish.clamp(now_m - reach, now_m + reach)), true)
+            }
+        };
+        self.climb.step(dt, wish, &mut self.height, tilt, learn)
+    }
+
+    /// Whether there is something to fly: not before it is known whether the motors run already.
+    #[must_use]
+    pub fn fills_channels(&self) -> bool {
+        self.phase != Phase::Grounded || self.flight.at.is_some()
+    }
+
+    /// An armed controller and no memory of a flight: in the air it is taken over, on the ground not.
+    fn adopt(&mut self, now: u64) {
+        let alone = self.phase == Phase::Grounded && self.flight.armed && self.decided.source == ChannelSource::Neutral;
+        let Some(range) = self.down.range_m.filter(|_| alone) else { return };
+        let height = range - self.height.rest_m();
+        if height < 0.3 || self.flight.throttle_us < 1150 {
+            return;
+        }
+        self.climb.set_hover(f32::from(self.flight.throttle_us));
+        self.climb.set_throttle(f32::from(self.flight.throttle_us));
+        self.hover_known = true;
+        self.height.set(now, height, 0.0, 0.0);
+        self.trim = self.level();
+        self.velocity.set_disturbance(Vector::ZERO);
+        self.hold = None;
+        self.hold_heading = Some(wrap_angle(self.heading()));
+        self.height_wish_m = self.config.height_m;
+        self.enter(now, Phase::Hover);
+        self.say("took over a flying drone");
+    }
+}
+

@@ -1,0 +1,181 @@
+//! From phase to phase.
+
+use crate::core::{Decided, PilotCore};
+use crate::senses::age_s;
+use control::{Action, Liftoff, TouchDown, Vector};
+use core::fmt::Write;
+use ipc_types::{LinkState, Phase, SetpointKind, Text};
+
+/// A controller that says so for this long did disarm, seconds: its status comes five times a second, and a
+/// restarted `flight` must have asked it first.
+const DISARMED_S: f32 = 1.0;
+/// The take-off is over when the height is this near, metres.
+const THERE_M: f32 = 0.12;
+/// A climb that takes longer goes on as a hover, seconds.
+const CLIMB_S: f32 = 12.0;
+/// Blind descent: rate, and time beyond the reckoned one after which the skids must stand, seconds.
+pub(crate) const BLIND_M_S: f32 = 0.35;
+const BLIND_MORE_S: f32 = 3.0;
+
+impl PilotCore {
+    /// One transition at most a step.
+    pub(crate) fn advance(&mut self, now: u64, dt: f32) {
+        let says_disarmed = self.flight.at.is_some()
+            && age_s(self.flight.at, now) < 1.0
+            && self.flight.link == LinkState::Up
+            && !self.flight.armed;
+        let disarmed_s = self.timers.disarmed.update(now, says_disarmed, 0.0);
+        let flies = !matches!(self.phase, Phase::Grounded | Phase::Arming | Phase::Cut);
+        if flies && disarmed_s >= DISARMED_S && self.phase_s(now) >= DISARMED_S {
+            self.stand(now, "the controller disarmed by itself");
+            return;
+        }
+        if self.airborne() {
+            match self.judged.action {
+                Action::Cut => {
+                    self.enter(now, Phase::Cut);
+                    self.say("motors cut: tilted over");
+                    return;
+                }
+                Action::Land | Action::Descend if self.phase != Phase::EmergencyLanding => {
+                    if self.judged.cause != control::Cause::Operator {
+                        self.land(now, None);
+                        self.enter(now, Phase::EmergencyLanding);
+                        self.say_failsafe();
+                    }
+                }
+                _ => {}
+            }
+        }
+        match self.phase {
+            Phase::Arming => self.arming(now),
+            Phase::TakeOff => self.taking_off(now, dt),
+            Phase::Hover => self.settle(),
+            Phase::Autonomous => {
+                if let Some(setpoint) = self.fresh_setpoint(now)
+                    && setpoint.kind == SetpointKind::Land
+                    && matches!(self.judged.action, Action::None | Action::Return)
+                {
+                    self.land(now, setpoint.hold);
+                    self.say("landing");
+                }
+            }
+            Phase::Landing | Phase::EmergencyLanding => self.landing(now, dt),
+            Phase::Cut => {
+                if self.flight.at.is_some() && !self.flight.armed && self.phase_s(now) > 2.0 {
+                    self.stand(now, "on the ground: the motors were cut");
+                }
+            }
+            Phase::Grounded | Phase::Manual => {}
+        }
+    }
+
+    fn arming(&mut self, now: u64) {
+        if self.flight.armed {
+            self.spool_up(now);
+        } else if self.phase_s(now) > self.config.take_off.arming_s {
+            let mut sentence = Text::<96>::default();
+            // What does not fit is cut.
+            let _ = match self.flight.reason.as_str() {
+                "" => sentence.write_str("refused: the controller did not arm"),
+                reason => write!(sentence, "refused: not armed: {reason}"),
+            };
+            self.give_up(now, sentence.as_str());
+        }
+    }
+
+    fn taking_off(&mut self, now: u64, dt: f32) {
+        let Some(spool) = &mut self.spool else {
+            let there = (self.height.height_m() - self.config.height_m).abs() < THERE_M;
+            if there || self.phase_s(now) > CLIMB_S {
+                self.enter(now, self.after_take_off);
+                self.say(if self.phase == Phase::Autonomous { "following navigation" } else { "hovering" });
+            }
+            return;
+        };
+        match spool.step(dt) {
+            Liftoff::SpoolingUp { throttle_us } => self.climb.override_throttle(throttle_us),
+            Liftoff::Lifted { hover_us, height_m, climb_m_s } => {
+                self.spool = None;
+                self.changed = true;
+                // What was learned in an earlier flight is better than the guess of a lift-off.
+                if !self.hover_known {
+                    self.climb.set_hover(hover_us);
+                }
+                self.hover_known = true;
+                self.climb.set_throttle(self.climb.hover_us());
+                self.height.set(now, height_m, climb_m_s, 0.0);
+            }
+            Liftoff::Stuck => self.give_up(now, "refused: full throttle does not lift the drone"),
+        }
+    }
+
+    /// Begins to come down over a place, or over where it stands.
+    pub(crate) fn land(&mut self, now: u64, place: Option<Vector>) {
+        self.spool = None;
+        self.touch = TouchDown::default();
+        self.blind_since_ns = None;
+        // In a hover the drone stands over its place already; out of a flight it lands where it stops.
+        self.hold = place.or(if self.phase == Phase::Hover { self.hold } else { None });
+        self.enter(now, Phase::Landing);
+    }
+
+    fn landing(&mut self, now: u64, dt: f32) {
+        self.settle();
+        let (clearance, climb, load) =
+            (self.height.clearance_m(), self.height.climb_m_s(), self.climb.load());
+        let blind = self.height.silent_s(now) > self.config.failsafe.height_hold_s;
+        if blind {
+            let since = *self.blind_since_ns.get_or_insert(now);
+            let reckoned = clearance.max(0.0) / BLIND_M_S + BLIND_MORE_S;
+            let waited = age_s(Some(since), now);
+            // The dead-reckoned height falls on below the ground: long enough below, it has been reached.
+            if clearance < -BLIND_M_S * BLIND_MORE_S || waited > reckoned + 6.0 {
+                self.stand(now, "landed blind");
+                return;
+            }
+        } else {
+            self.blind_since_ns = None;
+        }
+        if self.touch.step(&self.config.touch_down, dt, clearance, climb, load) && !blind {
+            let mut sentence = Text::<96>::default();
+            // What does not fit is cut.
+            let _ = if self.judged.action == Action::None {
+                sentence.write_str("landed")
+            } else {
+                write!(sentence, "landed: {}", crate::report::cause(self.judged.cause))
+            };
+            self.stand(now, sentence.as_str());
+        }
+    }
+
+    /// Motors off: the skids stand.
+    pub(crate) fn stand(&mut self, now: u64, why: &str) {
+        self.spool = None;
+        self.operator_land = false;
+        self.hold = None;
+        self.hold_heading = None;
+        self.decided = Decided::NEUTRAL;
+        self.climb.set_throttle(1000.0);
+        self.enter(now, Phase::Grounded);
+        self.say(why);
+    }
+
+    /// Chooses the place to hold once the drone has stopped.
+    pub(crate) fn settle(&mut self) {
+        if self.hold.is_none() && self.place_known() && self.motion.velocity().norm() < 0.12 {
+            self.hold = Some(self.motion.place());
+        }
+    }
+
+    pub(crate) fn fresh_setpoint(&self, now: u64) -> Option<crate::senses::SetpointSeen> {
+        self.setpoint.filter(|setpoint| now < setpoint.expiry_ns)
+    }
+
+    fn say_failsafe(&mut self) {
+        let mut sentence = Text::<96>::default();
+        // What does not fit is cut.
+        let _ = write!(sentence, "emergency landing: {}", crate::report::cause(self.judged.cause));
+        self.say(sentence.as_str());
+    }
+}

@@ -1,0 +1,150 @@
+//! What the pilot says: channels and state.
+
+use crate::core::PilotCore;
+use control::{Action, Cause, stick};
+use ipc_types::{Channels, FailsafeAction, FailsafeCause, Phase, PilotState, nanoseconds};
+
+/// Channels that are filled: four sticks, AUX1 (arm), AUX2 (angle).
+const CHANNELS: usize = 6;
+
+/// The message's word for an action.
+pub(crate) fn action(action: Action) -> FailsafeAction {
+    match action {
+        Action::None => FailsafeAction::None,
+        Action::Hover => FailsafeAction::Hover,
+        Action::Return => FailsafeAction::Return,
+        Action::Land => FailsafeAction::Land,
+        Action::Descend => FailsafeAction::Descend,
+        Action::Cut => FailsafeAction::Cut,
+    }
+}
+
+/// The message's word for a cause.
+pub(crate) fn cause(cause: Cause) -> FailsafeCause {
+    match cause {
+        Cause::None => FailsafeCause::None,
+        Cause::NavigationSilent => FailsafeCause::NavigationSilent,
+        Cause::SideSonarSilent => FailsafeCause::SideSonarSilent,
+        Cause::PoseUncertain => FailsafeCause::PoseUncertain,
+        Cause::AllSonarsSilent => FailsafeCause::AllSonarsSilent,
+        Cause::BatteryReturn => FailsafeCause::BatteryReturn,
+        Cause::BatteryLand => FailsafeCause::BatteryLand,
+        Cause::Lost => FailsafeCause::Lost,
+        Cause::HeightUnknown => FailsafeCause::HeightUnknown,
+        Cause::LinkDown => FailsafeCause::LinkDown,
+        Cause::Tilt => FailsafeCause::Tilt,
+        Cause::Operator => FailsafeCause::Operator,
+    }
+}
+
+impl PilotCore {
+    /// Writes the channels of the last step, every field but the header.
+    pub fn write_channels(&self, now: u64, out: &mut Channels) {
+        let d = &self.decided;
+        let mut us = [1000u16; 18];
+        us[0] = stick::channel(d.roll_us, 1500);
+        us[1] = stick::channel(d.pitch_us, 1500);
+        us[2] = stick::channel(d.throttle_us, 1000);
+        us[3] = stick::channel(d.yaw_us, 1500);
+        us[4] = if d.arm { 2000 } else { 1000 };
+        us[5] = 2000;
+        out.expiry_ns = now.saturating_add(nanoseconds(f64::from(self.config.expiry_s)));
+        out.channels_us = us;
+        out.count = CHANNELS as u16;
+        out.source = d.source.code();
+        out.arm = u8::from(d.arm);
+        out.level_roll_us = stick::of_angle(self.trim.roll);
+        out.level_pitch_us = stick::of_angle(self.trim.pitch);
+        out.hover_throttle_us = if self.hover_known { self.climb.hover_us() } else { f32::NAN };
+        let height_known = !self.airborne() || self.height.silent_s(now) < self.config.failsafe.height_descend_s;
+        out.height_m = if height_known { self.height.height_m() } else { f32::NAN };
+        out.climb_m_s = self.height.climb_m_s();
+        out.on_ground = u32::from(!self.airborne());
+    }
+
+    /// Writes the state, every field but the header.
+    pub fn write_state(&self, out: &mut PilotState) {
+        let nowhere = f32::NAN;
+        let policy = &self.config.failsafe;
+        out.phase_since_ns = self.phase_since_ns;
+        out.failsafe_since_ns = self.failsafe_since_ns;
+        out.causes = self.judged.causes;
+        out.command_sequence = self.command_sequence;
+        out.phase = self.phase.code();
+        out.cause = cause(self.judged.cause).code();
+        out.action = action(self.judged.action).code();
+        out.if_pose_lost = action(self.what_if(|e| e.pose_uncertain_s = policy.pose_hover_s)).code();
+        // No operator holds the sticks: his link carries nothing that flies the drone.
+        out.if_operator_lost = FailsafeAction::None.code();
+        out.if_height_lost = action(self.what_if(|e| e.height_silent_s = policy.height_descend_s)).code();
+        out.on_ground = u8::from(!self.airborne());
+        out.arm = u8::from(self.decided.arm);
+        out.hover_throttle_us = if self.hover_known { self.climb.hover_us() } else { nowhere };
+        out.level_roll_us = stick::of_angle(self.trim.roll);
+        out.level_pitch_us = stick::of_angle(self.trim.pitch);
+        out.height_m = self.height.height_m();
+        out.climb_m_s = self.height.climb_m_s();
+        out.surface_m = self.height.surface_m();
+        let disturbance = self.velocity.disturbance();
+        out.disturbance_x_m_s2 = disturbance.x;
+        out.disturbance_y_m_s2 = disturbance.y;
+        out.hold_x_m = self.hold.map_or(nowhere, |hold| hold.x);
+        out.hold_y_m = self.hold.map_or(nowhere, |hold| hold.y);
+        out.hold_heading_rad = self.hold_heading.unwrap_or(nowhere);
+        out.shield_speed_m_s = self.decided.shield_speed_m_s;
+        out.holder = ipc_types::Text::default();
+        out.text = self.text;
+    }
+
+    /// Whether the state has changed in a way that must be known at once; asking clears it.
+    pub fn take_changed(&mut self) -> bool {
+        core::mem::take(&mut self.changed)
+    }
+
+    /// One sentence for `sereno ps`.
+    pub fn write_status(&self, out: &mut ipc_types::Text<96>) {
+        use core::fmt::Write;
+        // What does not fit is cut.
+        let _ = match (self.phase, self.judged.action) {
+            (Phase::Grounded, _) => write!(out, "{}: {}", self.phase, self.text),
+            (_, Action::None) => write!(out, "{} at {:.2} m", self.phase, self.height.height_m()),
+            (_, what) => write!(
+                out,
+                "{} at {:.2} m, {}: {}",
+                self.phase,
+                self.height.height_m(),
+                cause(self.judged.cause),
+                action(what)
+            ),
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_codes_of_messages_and_table_agree() {
+        for &a in Action::ALL {
+            assert_eq!(action(a).code(), a as u8);
+        }
+        for (code, c) in [
+            (0, Cause::None),
+            (1, Cause::NavigationSilent),
+            (2, Cause::SideSonarSilent),
+            (3, Cause::PoseUncertain),
+            (4, Cause::AllSonarsSilent),
+            (5, Cause::BatteryReturn),
+            (6, Cause::BatteryLand),
+            (7, Cause::Lost),
+            (8, Cause::HeightUnknown),
+            (9, Cause::LinkDown),
+            (10, Cause::Tilt),
+            (11, Cause::Operator),
+        ] {
+            assert_eq!(cause(c).code(), code);
+            assert_eq!(c.bit(), 1 << code);
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Going on after a restart in the air.
+
+use crate::core::PilotCore;
+use control::{SpoolUp, Tilt, Vector, stick};
+use ipc_types::{Phase, PilotState};
+
+impl PilotCore {
+    /// Goes on from the last state that the pilot published before it died. `now` is the time of the first
+    /// step. A state that makes no sense is not used.
+    pub fn resume(&mut self, now: u64, state: &PilotState) {
+        let Some(phase) = Phase::from_code(state.phase) else {
+            self.refused += 1;
+            return;
+        };
+        self.command_sequence = state.command_sequence;
+        if (1120.0..=1800.0).contains(&state.hover_throttle_us) {
+            self.climb.set_hover(state.hover_throttle_us);
+        }
+        if phase == Phase::Grounded || state.arm == 0 {
+            return;
+        }
+        let trim = |us: f32| if us.is_finite() { stick::angle_of(us).clamp(-0.087, 0.087) } else { 0.0 };
+        self.trim = Tilt { roll: trim(state.level_roll_us), pitch: trim(state.level_pitch_us) };
+        self.velocity.set_disturbance(Vector::new(state.disturbance_x_m_s2, state.disturbance_y_m_s2));
+        self.hold_heading = state.hold_heading_rad.is_finite().then_some(state.hold_heading_rad);
+        self.hold = Vector::new(state.hold_x_m, state.hold_y_m).known();
+        self.operator_land = state.cause == ipc_types::FailsafeCause::Operator.code();
+        self.last_step_ns = Some(now);
+        self.height.set(now, state.height_m, state.climb_m_s, state.surface_m);
+        self.climb.set_throttle(self.climb.hover_us());
+        self.hover_known = true;
+        let flying = state.on_ground == 0;
+        match phase {
+            Phase::TakeOff if !flying => {
+                // Between idle and hover, within one step: lifted or not, this carries most of the weight.
+                let mut spool = SpoolUp::new(self.config.liftoff, self.climb.hover_us());
+                spool.resume();
+                self.spool = Some(spool);
+                self.enter(now, Phase::TakeOff);
+            }
+            Phase::Manual => {
+                // Nothing resumes by itself after manual control.
+                self.hold = None;
+                self.enter(now, Phase::Hover);
+            }
+            _ => self.enter(now, phase),
+        }
+        self.phase_since_ns = now;
+        // A round goes on when navigation says so; until its first setpoint the drone hovers.
+        self.say("took over after a restart");
+    }
+}

@@ -1,0 +1,57 @@
+//! The service on the lockstep bus, alone.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use ipc_types::Truth;
+use runtime::{Cache, Lockstep, Start, load_manifest};
+use simulator::{Config, Simulator};
+use std::path::Path;
+
+fn deploy() -> String {
+    let deploy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy");
+    format!("{0}/system.toml:{0}/sim.toml", deploy.display())
+}
+
+fn truths(seed: u64, seconds: u64) -> Vec<Truth> {
+    let (manifest, root) = load_manifest(&deploy()).unwrap();
+    let mut bus = Lockstep::new(manifest, &root, seed, Cache::default());
+    let mut ports = bus.tool("cli");
+    let mut truth = ports.input::<Truth>(64).unwrap();
+    bus.add_with::<Simulator>(Config::default()).unwrap();
+    let mut all = Vec::new();
+    let begin = bus.now();
+    for second in 1..=seconds {
+        bus.run_until(begin + second * 1_000_000_000);
+        while let Some(sample) = truth.receive() {
+            all.push(*sample);
+        }
+    }
+    assert_eq!(bus.refused("simulator"), 0);
+    assert!(bus.status("simulator").contains("0 contacts"), "{}", bus.status("simulator"));
+    all
+}
+
+#[test]
+fn the_truth_comes_at_50_hz_and_the_drone_waits_on_the_pad() {
+    let all = truths(3, 2);
+    assert!((99..=101).contains(&all.len()), "{}", all.len());
+    let last = all.last().unwrap();
+    assert_eq!((last.armed, last.on_ground, last.contacts), (0, 1, 0));
+    assert!(last.z_m.abs() < 0.05 && last.volts > 15.0 && last.charge > 0.99, "{last:?}");
+
+    // A scorer builds the same world and finds the drone on its pad.
+    let (manifest, root) = load_manifest(&deploy()).unwrap();
+    let seed = Start::service_seed(3, "simulator");
+    let start = Start::new(manifest.system.clone(), &root, seed, 0, true, Cache::default()).unwrap();
+    let pad = simulator::build_world(&Config::default(), &start).unwrap().pad();
+    assert!((last.x_m - pad.x).hypot(last.y_m - pad.y) < 0.05, "{last:?} {pad:?}");
+}
+
+#[test]
+fn equal_seeds_give_equal_bytes() {
+    let bytes = |seed| {
+        let all = truths(seed, 1);
+        all.iter().map(|truth| format!("{truth:?}")).collect::<Vec<_>>()
+    };
+    assert_eq!(bytes(5), bytes(5));
+    assert_ne!(bytes(5), bytes(6));
+}
