@@ -120,13 +120,15 @@ impl Core {
             Profile::Override => None,
         };
         let decision = self.ladder.decide(now, self.wish.as_ref(), believed);
-        let raised = self.config.profile == Profile::Receiver
+        // Before anything is known the arm switch has no position: a low one would drop an aircraft in the air.
+        let known = self.wish.is_some() || armed == Some(false);
+        let raised = known
+            && self.config.profile == Profile::Receiver
             && self.switch.step(now, decision.arm, &self.link.evidence(now));
         if !self.open {
             return;
         }
         let mut out = [0; MAX_FRAME];
-        let known = self.wish.is_some() || armed == Some(false);
         if known && self.link.order_settled(now) && self.frame_due(now, decision.step) {
             let (channels, count) = self.channels(now, &decision, raised, armed);
             if let Ok(length) = self.link.write_frame(now, &channels, count, &mut out) {
@@ -243,10 +245,18 @@ impl Core {
         }
     }
 
+    /// Link state, ladder and armed, as `flight/state` carries them: a change is worth a report at once.
+    #[must_use]
+    pub fn shape(&self, now: u64) -> (u8, u8, u8) {
+        let armed = u8::from(self.link.armed() == Some(true));
+        (self.link_state(now).code(), self.ladder.current().code(), armed)
+    }
+
     /// Everything about the controller and the link.
     #[must_use]
     pub fn state(&self, now: u64) -> FlightState {
         let counts = self.link.counts();
+        let (link, ladder, armed) = self.shape(now);
         let mut state = FlightState {
             modes: self.link.modes(),
             arming_blocks: self.link.blocks().map_or(0, |arming| arming.flags),
@@ -258,9 +268,9 @@ impl Core {
             version: self.link.identity().version,
             channels_us: self.sent_us,
             motors_us: self.link.said.motors_us,
-            armed: u8::from(self.link.armed() == Some(true)),
-            link: self.link_state(now).code(),
-            ladder: self.ladder.current().code(),
+            armed,
+            link,
+            ladder,
             profile: self.config.profile.code(),
             ..FlightState::default()
         };

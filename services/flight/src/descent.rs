@@ -202,7 +202,8 @@ impl Descent {
         let rate_m_s = self.rate_m_s;
         let falling = self.falling.as_mut()?;
         falling.predict(now, blind);
-        let wanted = if falling.height_m < SOFT_BELOW_M { -rate_m_s.min(SOFT_M_S) } else { -rate_m_s };
+        let wanted =
+            if heard && falling.height_m < SOFT_BELOW_M { -rate_m_s.min(SOFT_M_S) } else { -rate_m_s };
         let acceleration = if heard || blind {
             (CLIMB_GAIN * (wanted - falling.climb_m_s)).clamp(-MOST_M_S2, MOST_M_S2)
         } else {

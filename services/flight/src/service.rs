@@ -151,11 +151,10 @@ impl Flight {
         if let Some(power) = self.core.take_power() {
             self.power.publish(&power);
         }
-        let state = self.core.state(now);
-        let shape = (state.link, state.ladder, state.armed);
+        let shape = self.core.shape(now);
         let due = self.reported_ns.is_none_or(|last| now.saturating_sub(last) >= STATE_NS);
         if due || shape != self.reported {
-            self.state.publish(&state);
+            self.state.publish(&self.core.state(now));
             self.reported_ns = Some(now);
             self.reported = shape;
         }

@@ -29,7 +29,7 @@ fn land(world: &mut World, seconds: u64) {
             return;
         }
     }
-    panic!("still armed at {} m, {}", world.z, world.reason());
+    unreachable!("still armed at {} m, {}", world.z, world.reason());
 }
 
 #[test]

@@ -7,7 +7,7 @@ use common::{Controller, MS, Pilot, T0};
 use flight::{Config, Core, SerialDevice};
 use ipc_types::LinkState;
 use runtime::ByteDevice;
-use rustix::fs::{Mode, OFlags};
+use rustix::fs::OFlags;
 use rustix::pty::{OpenptFlags, grantpt, ioctl_tiocgptpeer, openpt, ptsname, unlockpt};
 use std::os::fd::OwnedFd;
 
@@ -26,7 +26,6 @@ fn pty() -> Pty {
     let path = ptsname(&master, Vec::new()).unwrap().into_string().unwrap();
     let flags = rustix::fs::fcntl_getfl(&master).unwrap();
     rustix::fs::fcntl_setfl(&master, flags | OFlags::NONBLOCK).unwrap();
-    let _ = Mode::empty();
     Pty { master, _slave: slave, path }
 }
 

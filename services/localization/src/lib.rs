@@ -1,1 +1,22 @@
-//! The localization service.
+//! Says where the drone is: the particle filter of [`mcl`] around the topics of the house.
+//!
+//! The particle set is a message. An update reads the last set through the service's own subscription and
+//! writes the next into a fresh loan; nothing is converted, and a restarted process goes on from the set
+//! that the keeper holds.
+
+mod attitude;
+mod config;
+mod flow;
+mod pose;
+mod predict;
+mod service;
+mod set;
+mod start;
+mod sweep;
+
+pub use attitude::{Attitudes, Mean};
+pub use config::{
+    LocalizationConfig, MotionSection, PopulationSection, SonarSection, StartSection, TrustSection,
+};
+pub use flow::Flows;
+pub use service::Localization;

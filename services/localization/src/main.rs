@@ -1,3 +1,5 @@
 //! The localization process.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    runtime::main::<localization::Localization>(runtime::NoDevices)
+}

@@ -1,8 +1,9 @@
 //! Everything but the ports: from places, echoes, commands and the pilot's state to a setpoint.
 
+use crate::atlas::Atlas;
 use crate::blockage::{Blockage, Verdict};
 use crate::config::NavigationConfig;
-use crate::journey::{Atlas, Journey, Work};
+use crate::journey::{Journey, Work};
 use crate::mission::{Event, Goal, Intent, Mission, Nonsense};
 use crate::place::Place;
 use crate::senses::Senses;
@@ -10,10 +11,10 @@ use crate::steer::{Craft, Scene, Steer, Steering};
 use avoid::grid::{insert, scroll};
 use avoid::{CELL_M, CELLS, GridRules, Histogram, SIDE, WallLayer, Window};
 use core::fmt::Write;
-use floorplan::{Cell, DistanceField};
+use floorplan::Cell;
 use ipc_types::{
-    Command, Grid, Patrol, PatrolState, PilotState, Polar, Pose, Setpoint, SetpointKind, SonarRanges, SteeringReason,
-    Text, nanoseconds, seconds_between,
+    Command, Grid, Patrol, PatrolState, PilotState, Polar, Pose, Setpoint, SetpointKind, SonarRanges,
+    SteeringReason, Text, nanoseconds, seconds_between,
 };
 use std::sync::Arc;
 
@@ -21,6 +22,8 @@ use std::sync::Arc;
 const STANDING_M_S: f32 = 0.03;
 /// The route ends this near to its last point, metres: the hold of the hover does the rest.
 const ARRIVED_M: f32 = 0.3;
+/// A route that ends this near to the pad leads home, metres.
+const HOME_M: f32 = 0.6;
 /// Cells of the plan nearer to a wall than this are stamped as wall, metres.
 const WALL_SKIN_M: f32 = 0.02;
 /// Beams kept for the grid between two decisions: two sweeps of a full set of sonars.
@@ -43,6 +46,7 @@ pub struct Core {
     stand: Option<(f32, f32)>,
     last_ns: Option<u64>,
     text: Text<128>,
+    started_ns: u64,
     refused: u64,
 }
 
@@ -51,11 +55,15 @@ impl Core {
     ///
     /// # Errors
     /// A vehicle that the histogram cannot be made for.
-    pub fn new(config: NavigationConfig, craft: Craft, atlas: Arc<Atlas>) -> Result<Self, avoid::ConfigError> {
+    pub fn new(
+        config: NavigationConfig,
+        craft: Craft,
+        atlas: Arc<Atlas>,
+    ) -> Result<Self, avoid::ConfigError> {
         Ok(Self {
             steering: Steering::new(craft)?,
             mission: Mission::new(atlas.pad()),
-            journey: Journey::new(Arc::clone(&atlas), craft, config.tries),
+            journey: Journey::new(Arc::clone(&atlas), config.tries),
             config,
             atlas,
             place: None,
@@ -67,6 +75,7 @@ impl Core {
             stand: None,
             last_ns: None,
             text: Text::new("waiting for a command"),
+            started_ns: 0,
             refused: 0,
         })
     }
@@ -99,6 +108,7 @@ impl Core {
     pub fn resume(&mut self, patrol: &Patrol) {
         match self.journey.restore(patrol) {
             Ok((state, there)) => {
+                self.started_ns = patrol.started_ns;
                 self.mission.restore(state, (patrol.pad_x_m, patrol.pad_y_m), there, patrol.command_sequence);
             }
             Err(Nonsense) => self.refused += 1,
@@ -149,6 +159,7 @@ impl Core {
             Ok(Some(Event::NewRound)) => {
                 self.journey.new_round();
                 self.journey.plan();
+                self.started_ns = self.last_ns.unwrap_or(0);
             }
             Ok(Some(Event::Plan)) => self.journey.plan(),
             Ok(Some(Event::Drop)) => self.journey.drop_route(),
@@ -203,9 +214,8 @@ impl Core {
         if self.mission.waited_on_the_ground(dt_s) {
             self.journey.drop_route();
         }
-        if let Some(place) = &place {
-            self.journey.see(place, now);
-            self.plan_on(place);
+        if let Some(place) = place.filter(|place| place.tracking && self.mission.airborne()) {
+            self.journey.see(&place);
         }
         let hearing = self.senses.fresh(now, self.config.ranges_age_s);
         let planned = self.journey.planned();
@@ -231,15 +241,18 @@ impl Core {
         setpoint
     }
 
-    /// Works one slice of a route that is being planned.
-    fn plan_on(&mut self, place: &Place) {
-        match self.journey.work(self.mission.goal(), place, self.mission.pad()) {
+    /// Works one bounded slice of a route that is being planned: to be called when the setpoint is out.
+    pub fn plan_on(&mut self, now: u64) {
+        let Some(place) = self.fresh_place(now) else {
+            return;
+        };
+        match self.journey.work(self.mission.goal(), &place, self.mission.pad()) {
             Work::Ready => {
                 self.mission.route_ready();
                 self.blockage.reset();
                 self.steering.forget();
             }
-            Work::NoWay => self.mission.no_way(Some(place)),
+            Work::NoWay => self.mission.no_way(Some(&place)),
             Work::Idle | Work::Busy => {}
         }
     }
@@ -255,9 +268,8 @@ impl Core {
         polar: &mut Polar,
     ) -> Steer {
         let (plan, field) = (self.atlas.plan(), self.atlas.field());
-        self.walls.follow(&window, |x, y| {
-            plan.cell_at(x, y) != Cell::Free || field.distance(x, y) < WALL_SKIN_M
-        });
+        self.walls
+            .follow(&window, |x, y| plan.cell_at(x, y) != Cell::Free || field.distance(x, y) < WALL_SKIN_M);
         let aim = if follow {
             self.journey.advance(place);
             self.steering.aim(&self.config, field, place, self.journey.track())
@@ -306,11 +318,22 @@ impl Core {
         if self.journey.homeward() {
             self.mission.homeward();
         }
-        if self.journey.track().remaining() < ARRIVED_M
-            && self.journey.track().end().is_some_and(|end| place.distance(end) < ARRIVED_M + 0.1)
+        let end = self.journey.track().end().filter(|end| place.distance(*end) < ARRIVED_M + 0.1);
+        if let Some(end) = end
+            && self.journey.complete()
+            && self.journey.track().remaining() < ARRIVED_M
         {
-            self.mission.arrived();
-            self.journey.drop_route();
+            let pad = self.mission.pad().unwrap_or(end);
+            let home = (pad.0 - end.0).hypot(pad.1 - end.1) < HOME_M;
+            if home || matches!(self.mission.goal(), Goal::There(_)) {
+                self.mission.arrived(end);
+                self.journey.drop_route();
+            } else {
+                // There was no way home from afar: asked again from here.
+                self.mission.homeward();
+                self.mission.replanning(place);
+                self.journey.plan();
+            }
             self.steering.forget();
             return setpoint;
         }
@@ -386,8 +409,9 @@ impl Core {
     }
 
     /// Fills the retained message.
-    pub fn write_patrol(&self, patrol: &mut Patrol) {
+    pub fn write_patrol(&mut self, patrol: &mut Patrol) {
         self.journey.write(patrol);
+        patrol.started_ns = self.started_ns;
         patrol.state = u32::from(self.mission.state().code());
         (patrol.pad_x_m, patrol.pad_y_m) = self.mission.pad().unwrap_or((f32::NAN, f32::NAN));
         patrol.command_sequence = self.mission.command();
@@ -432,12 +456,3 @@ fn write_polar(polar: &mut Polar, steer: Option<(&Steer, bool)>) {
 
 // The grid message holds exactly the window that the algorithms work on.
 const _: () = assert!(CELLS == ipc_types::GRID_CELLS && SIDE == ipc_types::GRID_SIDE);
-
-/// Distance field for steering: what is not free on the plan, farther than this is open, metres.
-pub const FIELD_M: f32 = 2.0;
-
-/// The field that steering wants of a plan.
-#[must_use]
-pub fn steering_field(plan: &floorplan::Plan) -> DistanceField {
-    DistanceField::of_not_free(plan, FIELD_M)
-}

@@ -1,3 +1,5 @@
 //! The navigation process.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    runtime::main::<navigation::Navigation>(runtime::NoDevices)
+}

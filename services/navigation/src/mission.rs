@@ -97,6 +97,7 @@ impl Mission {
             (PatrolState::Planning | PatrolState::Flying, _) => (PatrolState::Planning, Goal::Round),
             (PatrolState::Returning | PatrolState::Landing, _) => (PatrolState::Returning, Goal::Home),
             (PatrolState::GoingThere, Some(there)) => (PatrolState::GoingThere, Goal::There(there)),
+            (PatrolState::GoingThere, None) => (PatrolState::Idle, Goal::None),
             (PatrolState::Paused, _) => (PatrolState::Paused, Goal::Round),
             (state, _) => (state, Goal::None),
         };
@@ -314,10 +315,10 @@ impl Mission {
         }
     }
 
-    /// The end of the route is reached.
-    pub fn arrived(&mut self) {
+    /// The end of the route is reached, here.
+    pub fn arrived(&mut self, end: (f32, f32)) {
         match self.goal {
-            Goal::There(there) => self.stop(PatrolState::Idle, Some(there)),
+            Goal::There(_) => self.stop(PatrolState::Idle, Some(end)),
             Goal::Home | Goal::Round if self.pad.is_some() => {
                 self.head(Goal::Home, PatrolState::Landing, self.pad);
             }
@@ -344,7 +345,7 @@ impl Mission {
             }
             return Intent::Land(pad);
         }
-        if self.under_way() && planned && self.airborne() { Intent::Follow } else { Intent::Hover(self.hold) }
+        if self.under_way() && planned && self.heeded() { Intent::Follow } else { Intent::Hover(self.hold) }
     }
 }
 

@@ -46,23 +46,36 @@ impl Track {
     pub fn set(&mut self, points: impl IntoIterator<Item = (f32, f32)>) {
         self.clear();
         for (x, y) in points {
-            if self.points.len() == MAX_CORNERS {
-                break;
-            }
-            if !(x.is_finite() && y.is_finite()) {
-                continue;
-            }
-            let length = self
-                .points
-                .last()
-                .zip(self.lengths.last())
-                .map_or(0.0, |(last, length)| length + (x - last.0).hypot(y - last.1));
-            if self.lengths.last().is_some_and(|last| length - last < SHORTEST_M) {
-                continue;
-            }
-            self.points.push((x, y));
-            self.lengths.push(length);
+            self.push(x, y);
         }
+    }
+
+    /// Adds a point at the end. False when it was left out.
+    pub fn push(&mut self, x: f32, y: f32) -> bool {
+        if self.points.len() >= MAX_CORNERS || !(x.is_finite() && y.is_finite()) {
+            return false;
+        }
+        let last = self.points.last().zip(self.lengths.last());
+        let length = last.map_or(0.0, |(last, length)| length + (x - last.0).hypot(y - last.1));
+        if self.lengths.last().is_some_and(|last| length - last < SHORTEST_M) {
+            return false;
+        }
+        self.points.push((x, y));
+        self.lengths.push(length);
+        true
+    }
+
+    /// Drops the first points, passed ones; the progress stays at the same place.
+    pub fn forget(&mut self, points: usize) {
+        let Some(cut) = self.lengths.get(points).copied() else {
+            return;
+        };
+        self.points.drain(..points);
+        self.lengths.drain(..points);
+        for length in &mut self.lengths {
+            *length -= cut;
+        }
+        self.along -= cut;
     }
 
     /// No line.
@@ -245,6 +258,20 @@ mod tests {
             track.advance(0.1 * i as f32, 0.0);
         }
         assert!((track.along() - 2.0).abs() < 1e-3, "at the crossing, on the first pass");
+    }
+
+    #[test]
+    fn forgetting_what_is_passed_changes_nothing_ahead() {
+        let mut track = track(&[(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 0.0)]);
+        for i in 0..=15 {
+            track.advance(0.1 * i as f32, 0.0);
+        }
+        let (aim, remaining) = (track.aim(1.0), track.remaining());
+        track.forget(1);
+        assert_eq!(track.next(), 1);
+        assert!((track.aim(1.0).0 - aim.0).abs() < 1e-5 && (track.remaining() - remaining).abs() < 1e-5);
+        track.forget(9);
+        assert!((track.remaining() - remaining).abs() < 1e-5);
     }
 
     #[test]

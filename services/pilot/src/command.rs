@@ -27,7 +27,10 @@ impl PilotCore {
             (Verb::GoTo | Verb::PatrolStart | Verb::Home, Phase::Arming | Phase::TakeOff) => {
                 self.after_take_off = Phase::Autonomous;
             }
-            (Verb::GoTo | Verb::PatrolStart | Verb::PatrolPause | Verb::PatrolStop | Verb::Home, Phase::Hover) => {
+            (
+                Verb::GoTo | Verb::PatrolStart | Verb::PatrolPause | Verb::PatrolStop | Verb::Home,
+                Phase::Hover,
+            ) => {
                 self.enter(now, Phase::Autonomous);
                 self.say("following navigation");
             }
@@ -90,7 +93,11 @@ impl PilotCore {
         } else if age_s(self.attitude.at, now) > 0.5 {
             out.write_str("refused: the controller sends no attitude")
         } else if cell < self.config.take_off.cell_volts {
-            write!(out, "refused: battery at {cell:.2} V a cell, {:.2} needed", self.config.take_off.cell_volts)
+            write!(
+                out,
+                "refused: battery at {cell:.2} V a cell, {:.2} needed",
+                self.config.take_off.cell_volts
+            )
         } else if !self.craft.has_down || age_s(self.down.ping_ns, now) > 0.5 {
             out.write_str("refused: the down sonar is silent")
         } else if !self.down.good {

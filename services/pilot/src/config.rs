@@ -166,7 +166,10 @@ mod tests {
     fn unknown_keys_and_bad_ranges_are_refused_by_name() {
         let error = parse_config::<PilotConfig>("pilot.toml", "[velocity]\nmax_tilt_deg = 40.0").unwrap_err();
         let error = error.to_string();
-        assert!(error.contains("pilot.toml: velocity.max_tilt_deg = 40") && error.contains("3..=15"), "{error}");
+        assert!(
+            error.contains("pilot.toml: velocity.max_tilt_deg = 40") && error.contains("3..=15"),
+            "{error}"
+        );
         let error = parse_config::<PilotConfig>("pilot.toml", "heigth_m = 1.2").unwrap_err().to_string();
         assert!(error.contains("heigth_m"), "{error}");
         assert!(parse_config::<PilotConfig>("pilot.toml", "height_m = 1.9").is_err());

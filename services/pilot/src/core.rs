@@ -3,18 +3,12 @@
 use crate::config::PilotConfig;
 use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, age_s};
 use control::{
-    ClimbController, Echo, Footing, HeightEstimator, Held, Judgement, Look, Motion, Shield, SpoolUp, Tilt,
-    TouchDown, Vector, VelocityController, WayHome, wrap_angle,
+    ClimbController, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp, Tilt, TouchDown,
+    Vector, VelocityController, WayHome, wrap_angle,
 };
 use floorplan::{DistanceField, Plan};
-use ipc_types::{
-    Attitude, ChannelSource, FlightState, Patrol, PatrolState, Phase, Pose, Power, Setpoint, SonarHealth,
-    SonarRanges, SonarStatus, Text,
-};
+use ipc_types::{ChannelSource, Phase, Text};
 use std::sync::Arc;
-
-/// Speed of sound at 20 C, m/s, to place an echo in time.
-const SOUND_M_S: f32 = 343.0;
 
 /// What the pilot must know about the aircraft.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,7 +112,7 @@ pub struct PilotCore {
     pub(crate) height_wish_m: f32,
     pub(crate) trim: Tilt,
     pub(crate) hover_known: bool,
-    pub(crate) settled: bool,
+    pub(crate) resumed: bool,
     pub(crate) operator_land: bool,
     pub(crate) blind_since_ns: Option<u64>,
     pub(crate) aside_s: f32,
@@ -158,7 +152,7 @@ impl PilotCore {
             height: HeightEstimator::new(config.height, craft.rest_m),
             climb: ClimbController::new(config.climb, hover_us),
             motion: Motion::new(config.motion),
-            velocity: VelocityController::new(velocity),
+            velocity: VelocityController::new(velocity, config.motion.drag_per_s),
             shield: Shield::new(config.shield, craft.radius_m, craft.sides.iter().copied()),
             spool: None,
             touch: TouchDown::default(),
@@ -170,7 +164,7 @@ impl PilotCore {
             height_wish_m: config.height_m,
             trim: Tilt::default(),
             hover_known: false,
-            settled: false,
+            resumed: false,
             operator_land: false,
             blind_since_ns: None,
             aside_s: 0.0,
@@ -184,116 +178,6 @@ impl PilotCore {
             text: Text::new("on the ground"),
             config,
             craft,
-        }
-    }
-
-    /// Takes an attitude.
-    pub fn attitude(&mut self, message: &Attitude) {
-        if !self.attitude.take(message) {
-            self.refused += 1;
-            return;
-        }
-        if self.phase == Phase::Grounded && !self.flight.armed {
-            // On the ground gravity is all that the controller's accelerometer feels: about a second's mean.
-            let share = if self.ground.seen == 0 { 1.0 } else { 0.03 };
-            self.ground.seen = self.ground.seen.saturating_add(1);
-            let (old, new) = (self.ground.tilt, self.attitude.tilt);
-            self.ground.tilt = Tilt {
-                roll: old.roll + share * (new.roll - old.roll),
-                pitch: old.pitch + share * (new.pitch - old.pitch),
-            };
-        }
-    }
-
-    /// Takes a pose.
-    pub fn pose(&mut self, message: &Pose) {
-        match self.pose.take(message) {
-            Some((at, place, velocity)) => self.motion.correct(at, place, velocity),
-            None => self.refused += 1,
-        }
-    }
-
-    /// Takes what the controller and its link are doing.
-    pub fn flight_state(&mut self, message: &FlightState) {
-        if !self.flight.take_state(message) {
-            self.refused += 1;
-        }
-    }
-
-    /// Takes the battery.
-    pub fn power(&mut self, message: &Power) {
-        self.flight.take_power(message, self.craft.cells);
-    }
-
-    /// Takes a setpoint of navigation.
-    pub fn setpoint(&mut self, message: &Setpoint) {
-        match SetpointSeen::read(message) {
-            Some(setpoint) => self.setpoint = Some(setpoint),
-            None => self.refused += 1,
-        }
-    }
-
-    /// Takes the pad from navigation's round, to know the way home.
-    pub fn patrol(&mut self, message: &Patrol) {
-        let known = u8::try_from(message.state).ok().and_then(PatrolState::from_code);
-        let pad = Vector::new(message.pad_x_m, message.pad_y_m);
-        if known.is_some_and(|state| state != PatrolState::Idle) && pad.is_finite() {
-            self.set_home(pad);
-        }
-    }
-
-    pub(crate) fn set_home(&mut self, home: Vector) {
-        if let Some(way) = &mut self.way_home
-            && way.home().is_none_or(|known| (known - home).norm() > 0.3)
-        {
-            way.set_home(home);
-        }
-    }
-
-    /// Takes a ping group.
-    pub fn ranges(&mut self, message: &SonarRanges) {
-        if message.count as usize > ipc_types::MAX_SONARS {
-            self.refused += 1;
-            return;
-        }
-        self.shield.set_sweep(message.sweep_s);
-        for reading in message.filled() {
-            let (Some(status), Some(health)) =
-                (SonarStatus::from_code(reading.status), SonarHealth::from_code(reading.health))
-            else {
-                self.refused += 1;
-                continue;
-            };
-            let good = health == SonarHealth::Good && status != SonarStatus::Fault;
-            if reading.looks_down() {
-                self.down.ping_ns = Some(reading.ping_ns);
-                self.down.good = good;
-                self.down.range_m = reading.range().filter(|_| good);
-                if let Some(range) = self.down.range_m {
-                    self.hear_ground(reading.ping_ns, range);
-                }
-            } else if good {
-                let echo = match status {
-                    SonarStatus::Ok => Echo::Range(reading.range_m),
-                    _ => Echo::Nothing,
-                };
-                let look = Look { at_ns: reading.ping_ns, heading: self.heading(), echo };
-                if !self.shield.hear(usize::from(reading.sensor), look) {
-                    self.refused += 1;
-                }
-            }
-        }
-    }
-
-    fn hear_ground(&mut self, ping_ns: u64, range_m: f32) {
-        let at = ping_ns + (range_m / SOUND_M_S * 1e9) as u64;
-        if let Some(spool) = &mut self.spool {
-            spool.hear(at, range_m - self.height.rest_m());
-        } else if self.airborne() {
-            let tilt = self.tilt().magnitude();
-            self.height.measure(at, range_m, tilt);
-        } else if self.phase == Phase::Grounded {
-            self.down.stand(range_m);
         }
     }
 
@@ -357,7 +241,9 @@ impl PilotCore {
         match self.phase {
             Phase::Grounded | Phase::Arming | Phase::Cut => false,
             Phase::TakeOff => self.spool.is_none(),
-            Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing | Phase::EmergencyLanding => true,
+            Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing | Phase::EmergencyLanding => {
+                true
+            }
         }
     }
 
@@ -387,7 +273,6 @@ impl PilotCore {
             self.phase = phase;
             self.phase_since_ns = now;
             self.changed = true;
-            self.settled = false;
             self.aside_s = 0.0;
         }
     }

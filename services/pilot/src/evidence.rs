@@ -71,8 +71,7 @@ impl PilotCore {
         }
         let Some(length) = way.length_m(self.motion.place()) else { return false };
         let measured = self.flight.amps > 0.5;
-        let amps =
-            if measured { self.flight.amps } else { self.craft.capacity_mah * 1e-3 / HOVER_HOURS };
+        let amps = if measured { self.flight.amps } else { self.craft.capacity_mah * 1e-3 / HOVER_HOURS };
         let seconds = length / (HOME_PACE * self.craft.cruise_m_s).max(0.05) + LANDING_S;
         let needed = amps * 1000.0 * seconds / 3600.0 * (1.0 + self.config.failsafe.home_reserve);
         USABLE * self.craft.capacity_mah - drawn < needed

@@ -4,8 +4,7 @@ use crate::core::{Decided, PilotCore};
 use crate::phases::BLIND_M_S;
 use crate::senses::age_s;
 use control::{
-    Action, Asking, Source, Tilt, Vector, VerticalWish, arbitrate, hold_velocity, stick,
-    wrap_angle, yaw_rate,
+    Action, Asking, Source, Tilt, Vector, VerticalWish, arbitrate, hold_velocity, stick, wrap_angle, yaw_rate,
 };
 use ipc_types::{ChannelSource, Phase, SetpointKind};
 
@@ -21,6 +20,8 @@ const PUSH_CLEARANCE_M: f32 = 0.35;
 const LEARN_CLEARANCE_M: f32 = 0.35;
 /// A velocity that is less certain is not flown by, m/s.
 const MOST_VELOCITY_SIGMA: f32 = 0.6;
+/// No wish is flown faster than this many times the vehicle's cruise speed.
+const FASTEST: f32 = 1.2;
 /// A velocity is reckoned on by tilt alone for so long, seconds.
 const RECKON_S: f32 = 1.5;
 /// Growth and fall of the wished height, m/s.
@@ -51,8 +52,7 @@ impl PilotCore {
         if self.airborne() {
             let acceleration = tilt.acceleration(self.heading()) + self.velocity.disturbance();
             self.motion.predict(now, acceleration.limited(4.0));
-            let vertical =
-                self.climb.expected_acceleration(dt, tilt.magnitude(), self.height.climb_m_s());
+            let vertical = self.climb.expected_acceleration(dt, tilt.magnitude(), self.height.climb_m_s());
             self.height.predict(now, vertical);
         } else {
             self.motion.predict(now, Vector::ZERO);
@@ -89,11 +89,7 @@ impl PilotCore {
     /// The horizontal wish (plan frame) and whose it is.
     fn wish(&mut self, now: u64) -> (Vector, Source) {
         let setpoint = self.fresh_setpoint(now).filter(|_| self.phase == Phase::Autonomous);
-        let asking = Asking {
-            airborne: true,
-            navigation: setpoint.is_some(),
-            failsafe: self.judged.action,
-        };
+        let asking = Asking { airborne: true, navigation: setpoint.is_some(), failsafe: self.judged.action };
         let source = arbitrate(&asking);
         let place = self.place_known();
         if let (Source::Navigation, Some(setpoint)) = (source, setpoint) {
@@ -131,7 +127,8 @@ impl PilotCore {
         let heading = self.heading();
         let guarded = self.shield.guard(
             now,
-            wish.limited(1.5 * self.craft.cruise_m_s),
+            wish.limited(FASTEST * self.craft.cruise_m_s),
+            self.motion.velocity(),
             &self.footing(),
             self.walls.as_deref(),
             clearance > PUSH_CLEARANCE_M,
@@ -210,7 +207,8 @@ impl PilotCore {
             _ if blind => (VerticalWish::Rate(0.0), false),
             Phase::TakeOff => {
                 let left = c.height_m - self.height.height_m();
-                let rate = (c.climb.height_gain_per_s * left).clamp(-c.take_off.climb_m_s, c.take_off.climb_m_s);
+                let rate =
+                    (c.climb.height_gain_per_s * left).clamp(-c.take_off.climb_m_s, c.take_off.climb_m_s);
                 (VerticalWish::Rate(rate), true)
             }
             _ => {
@@ -232,7 +230,9 @@ impl PilotCore {
 
     /// An armed controller and no memory of a flight: in the air it is taken over, on the ground not.
     fn adopt(&mut self, now: u64) {
-        let alone = self.phase == Phase::Grounded && self.flight.armed && self.decided.source == ChannelSource::Neutral;
+        let alone = self.phase == Phase::Grounded
+            && self.flight.armed
+            && self.decided.source == ChannelSource::Neutral;
         let Some(range) = self.down.range_m.filter(|_| alone) else { return };
         let height = range - self.height.rest_m();
         if height < 0.3 || self.flight.throttle_us < 1150 {
@@ -251,4 +251,3 @@ impl PilotCore {
         self.say("took over a flying drone");
     }
 }
-

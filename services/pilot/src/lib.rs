@@ -9,6 +9,7 @@ mod config;
 mod core;
 mod evidence;
 mod flying;
+mod inputs;
 mod phases;
 mod report;
 mod resume;

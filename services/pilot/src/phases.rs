@@ -37,12 +37,13 @@ impl PilotCore {
                     self.say("motors cut: tilted over");
                     return;
                 }
-                Action::Land | Action::Descend if self.phase != Phase::EmergencyLanding => {
-                    if self.judged.cause != control::Cause::Operator {
-                        self.land(now, None);
-                        self.enter(now, Phase::EmergencyLanding);
-                        self.say_failsafe();
-                    }
+                Action::Land | Action::Descend
+                    if self.phase != Phase::EmergencyLanding
+                        && self.judged.cause != control::Cause::Operator =>
+                {
+                    self.land(now, None);
+                    self.enter(now, Phase::EmergencyLanding);
+                    self.say_failsafe();
                 }
                 _ => {}
             }

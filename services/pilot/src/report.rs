@@ -56,7 +56,8 @@ impl PilotCore {
         out.level_roll_us = stick::of_angle(self.trim.roll);
         out.level_pitch_us = stick::of_angle(self.trim.pitch);
         out.hover_throttle_us = if self.hover_known { self.climb.hover_us() } else { f32::NAN };
-        let height_known = !self.airborne() || self.height.silent_s(now) < self.config.failsafe.height_descend_s;
+        let height_known =
+            !self.airborne() || self.height.silent_s(now) < self.config.failsafe.height_descend_s;
         out.height_m = if height_known { self.height.height_m() } else { f32::NAN };
         out.climb_m_s = self.height.climb_m_s();
         out.on_ground = u32::from(!self.airborne());

@@ -46,6 +46,7 @@ impl PilotCore {
             _ => self.enter(now, phase),
         }
         self.phase_since_ns = now;
+        self.resumed = true;
         // A round goes on when navigation says so; until its first setpoint the drone hovers.
         self.say("took over after a restart");
     }

@@ -14,6 +14,8 @@ const STALL_NS: u64 = 250_000_000;
 const CATCH_UP_NS: u64 = 50_000_000;
 /// Bytes moved at once; more than a tick's worth of a 115200 baud line.
 const CHUNK: usize = 512;
+/// Reads in one step: a peer that floods its line must not hold the world up.
+const MOST_CHUNKS: usize = 16;
 /// Steps between two attempts to open a device that is closed.
 const REOPEN_STEPS: u64 = 200;
 
@@ -124,7 +126,8 @@ impl Simulator {
     fn exchange(&mut self) {
         let mut chunk = [0; CHUNK];
         if open(&mut *self.controller, self.steps) {
-            while let Ok(count @ 1..) = self.controller.read(&mut chunk) {
+            for _ in 0..MOST_CHUNKS {
+                let Ok(count @ 1..) = self.controller.read(&mut chunk) else { break };
                 self.flight.controller_write(&chunk[..count.min(CHUNK)]);
             }
         }

@@ -15,12 +15,13 @@ fn truths(seed: u64, seconds: u64) -> Vec<Truth> {
     let (manifest, root) = load_manifest(&deploy()).unwrap();
     let mut bus = Lockstep::new(manifest, &root, seed, Cache::default());
     let mut ports = bus.tool("cli");
-    let mut truth = ports.input::<Truth>(64).unwrap();
+    let mut truth = ports.input::<Truth>(16).unwrap();
     bus.add_with::<Simulator>(Config::default()).unwrap();
     let mut all = Vec::new();
     let begin = bus.now();
-    for second in 1..=seconds {
-        bus.run_until(begin + second * 1_000_000_000);
+    // More often than an input's depth of samples.
+    for tenth in 1..=10 * seconds {
+        bus.run_until(begin + tenth * 100_000_000);
         while let Some(sample) = truth.receive() {
             all.push(*sample);
         }

@@ -15,6 +15,6 @@ mod simulated;
 pub use config::SonarConfig;
 pub use driver::{Answer, Collected, SonarDriver};
 pub use health::{HealthRules, SensorHealth};
-pub use range::{Converter, Converted};
+pub use range::{Converted, Converter};
 pub use schedule::{Schedule, ScheduleError};
 pub use service::Sonar;

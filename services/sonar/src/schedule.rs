@@ -153,7 +153,10 @@ mod tests {
         ];
         let schedule = Schedule::new(&sonars).unwrap();
         assert_eq!(schedule.len(), 2);
-        assert_eq!([schedule.sensors(0), schedule.sensors(1), schedule.sensors(2)], [0b10011, 0b11100, 0b10011]);
+        assert_eq!(
+            [schedule.sensors(0), schedule.sensors(1), schedule.sensors(2)],
+            [0b10011, 0b11100, 0b10011]
+        );
     }
 
     #[test]
@@ -165,7 +168,8 @@ mod tests {
 
     #[test]
     fn two_that_would_hear_each_other_are_named() {
-        let sonars = [sonar("front", 0.0, 0.0, 0), sonar("front-left", 45.0, 0.0, 0), sonar("down", 0.0, -90.0, 1)];
+        let sonars =
+            [sonar("front", 0.0, 0.0, 0), sonar("front-left", 45.0, 0.0, 0), sonar("down", 0.0, -90.0, 1)];
         let text = Schedule::new(&sonars).map_err(|e| e.to_string());
         assert_eq!(
             text,

@@ -51,7 +51,11 @@ impl Bench {
     }
 
     /// Runs for `ms`, answering every ping by `answer(sensor)`; collects pings (time, sensors) and ranges.
-    fn run(&mut self, ms: u64, answer: impl Fn(u8, &mut Echo) -> bool) -> (Vec<(u64, u32)>, Vec<SonarRanges>) {
+    fn run(
+        &mut self,
+        ms: u64,
+        answer: impl Fn(u8, &mut Echo) -> bool,
+    ) -> (Vec<(u64, u32)>, Vec<SonarRanges>) {
         let (mut pings, mut ranges) = (Vec::new(), Vec::new());
         for _ in 0..ms {
             self.system.run_until(self.system.now() + 1_000_000);
@@ -82,7 +86,10 @@ fn groups_follow_each_other_and_every_sensor_has_its_turn() {
     let mut bench = Bench::new(VEHICLE).unwrap();
     let (pings, ranges) = bench.run(1_300, |s, echo| pulse(s, 0.005 + 0.001 * f32::from(s), echo));
     assert!(pings.len() > 19, "{} pings in 1.3 s", pings.len());
-    assert!(pings.windows(2).all(|w| w[1].0 - w[0].0 >= 58_500_000), "the datasheet's 60 ms, less the tick's jitter");
+    assert!(
+        pings.windows(2).all(|w| w[1].0 - w[0].0 >= 58_500_000),
+        "the datasheet's 60 ms, less the tick's jitter"
+    );
     let masks: Vec<u32> = pings.iter().take(5).map(|p| p.1).collect();
     assert_eq!(masks, [0b1_0001_0001, 0b1_0010_0010, 0b1_0100_0100, 0b1_1000_1000, 0b1_0001_0001]);
     let last = ranges.last().unwrap();
@@ -128,7 +135,10 @@ fn echoes_that_make_no_sense_are_refused_and_counted() {
     let mut bench = Bench::new(VEHICLE).unwrap();
     let (_, ranges) = bench.run(600, |s, echo| {
         pulse(s, 0.01, echo);
-        echo.count = 99;
+        // The down sonar is the last of every group.
+        if s == 8 {
+            echo.count = 99;
+        }
         true
     });
     assert!(ranges.iter().all(|r| r.filled().iter().all(|r| r.status == SonarStatus::Fault.code())));

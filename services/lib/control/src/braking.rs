@@ -37,7 +37,8 @@ mod tests {
     #[test]
     fn the_examples_of_the_facts() {
         // Eight one by one (0.48 s a sweep) and in pairs (0.24 s).
-        for (sweep, speed, distance) in [(0.48, 0.5, 0.48), (0.24, 0.5, 0.36), (0.48, 1.0, 1.08), (0.24, 1.0, 0.84)]
+        for (sweep, speed, distance) in
+            [(0.48, 0.5, 0.48), (0.24, 0.5, 0.36), (0.48, 1.0, 1.08), (0.24, 1.0, 0.84)]
         {
             let braking = Braking { delay_s: sweep + 0.35, deceleration_m_s2: 2.0 };
             assert!((braking.distance(speed) - distance).abs() < 0.006, "{}", braking.distance(speed));

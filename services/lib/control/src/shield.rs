@@ -23,7 +23,7 @@ pub struct ShieldConfig {
     pub near_m: f32,
     /// Speed away for each metre nearer than `near_m`, 1/s: both jambs of a door push alike, which centres.
     pub push_gain_per_s: f32,
-    /// Fastest push, m/s.
+    /// Fastest push, m/s: more than what gusts of 0.2 m/s2 make the velocity loop miss.
     pub max_push_m_s: f32,
     /// Half-angle of what a sonar can vouch for, degrees: 22.5 joins eight, the rest is its cone.
     pub look_half_angle_deg: f32,
@@ -46,10 +46,10 @@ pub struct ShieldConfig {
 impl Default for ShieldConfig {
     fn default() -> Self {
         Self {
-            margin_m: 0.05,
+            margin_m: 0.07,
             near_m: 0.30,
-            push_gain_per_s: 0.5,
-            max_push_m_s: 0.12,
+            push_gain_per_s: 0.8,
+            max_push_m_s: 0.2,
             look_half_angle_deg: 28.0,
             cone_half_angle_deg: 15.0,
             reaction_s: 0.35,
@@ -285,7 +285,8 @@ impl Shield {
 
     /// The speed that may be flown in a direction (unit vector, plan frame).
     fn allowed(&self, now: u64, direction: Vector, footing: &Footing, walls: Option<&DistanceField>) -> f32 {
-        if self.watched(now, wrap_angle(direction.angle() - footing.heading)).is_none_or(|(_, off)| off > 0.0) {
+        if self.watched(now, wrap_angle(direction.angle() - footing.heading)).is_none_or(|(_, off)| off > 0.0)
+        {
             return 0.0;
         }
         let c = &self.config;
@@ -299,16 +300,20 @@ impl Shield {
         speed.min(braking.speed(soft).max(c.creep_m_s.min(braking.speed(hard))))
     }
 
-    /// Passes a wish (plan frame, m/s): what is left can be stopped before anything that is seen.
+    /// Passes a wish (plan frame, m/s): what is left can be stopped before anything that is seen. `flown` is
+    /// the velocity now: what is too fast towards a near thing is braked harder than by a smaller wish alone.
+    /// `may_push` is for the air well above ground, where near echoes are no floor.
     pub fn guard(
         &self,
         now: u64,
         wish: Vector,
+        flown: Vector,
         footing: &Footing,
         walls: Option<&DistanceField>,
         may_push: bool,
     ) -> Guarded {
         let wish = wish.known().unwrap_or(Vector::ZERO);
+        let flown = flown.known().unwrap_or(Vector::ZERO);
         let braking = self.braking();
         let mut velocity = wish;
         let mut push = Vector::ZERO;
@@ -329,7 +334,10 @@ impl Shield {
                 let distance = centre.norm().max(1e-3);
                 let missing = self.config.near_m - (distance - self.radius_m);
                 if missing > 0.0 {
-                    push = push - centre * (self.config.push_gain_per_s * missing / distance);
+                    let towards = centre * (1.0 / distance);
+                    let stoppable = braking.speed(distance - self.radius_m - self.config.margin_m);
+                    let too_fast = (flown.dot(towards) - stoppable).clamp(0.0, 1.0);
+                    push = push - towards * (self.config.push_gain_per_s * missing + too_fast);
                 }
             }
             velocity += push.limited(self.config.max_push_m_s);

@@ -54,7 +54,11 @@ pub fn yaw_rate_of(channel_us: f32) -> f32 {
 /// The yaw channel that asks for a turn rate counter-clockwise, microseconds, unrounded.
 #[must_use]
 pub fn of_yaw_rate(rate_rad_s: f32) -> f32 {
-    if rate_rad_s.is_finite() { CENTRE_US - 500.0 * uncurve(rate_rad_s / FULL_YAW_RATE_RAD_S) } else { CENTRE_US }
+    if rate_rad_s.is_finite() {
+        CENTRE_US - 500.0 * uncurve(rate_rad_s / FULL_YAW_RATE_RAD_S)
+    } else {
+        CENTRE_US
+    }
 }
 
 /// A channel as it is sent: rounded, 1000..=2000, `absent` for what is no number.

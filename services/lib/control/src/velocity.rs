@@ -100,16 +100,24 @@ impl Tilt {
 #[derive(Clone, Debug)]
 pub struct VelocityController {
     config: VelocityConfig,
+    drag_per_s: f32,
     reference: Vector,
     compensation: Vector,
     tilt: Tilt,
 }
 
 impl VelocityController {
-    /// At rest, with nothing learned.
+    /// At rest, with nothing learned. `drag_per_s` is paid for by the wished velocity: what the disturbance
+    /// estimate learned of it in flight would push on when braking.
     #[must_use]
-    pub fn new(config: VelocityConfig) -> Self {
-        Self { config, reference: Vector::ZERO, compensation: Vector::ZERO, tilt: Tilt::default() }
+    pub fn new(config: VelocityConfig, drag_per_s: f32) -> Self {
+        Self {
+            config,
+            drag_per_s,
+            reference: Vector::ZERO,
+            compensation: Vector::ZERO,
+            tilt: Tilt::default(),
+        }
     }
 
     /// The learned disturbance, an acceleration in the plan frame.
@@ -157,7 +165,8 @@ impl VelocityController {
                 self.reference = before.approached(wish, rate * dt);
                 let change = (self.reference - before) * (c.feed_forward / dt.max(1e-3));
                 let error = self.reference - velocity;
-                let wanted = error * c.gain_per_s + change + self.compensation;
+                let drag = self.reference * self.drag_per_s;
+                let wanted = error * c.gain_per_s + change + drag + self.compensation;
                 let saturated = wanted.norm() > GRAVITY_M_S2 * most.tan();
                 if !saturated || error.dot(self.compensation) < 0.0 {
                     let grown = self.compensation + error * (c.integral_per_s2 * dt);

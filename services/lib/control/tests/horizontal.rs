@@ -3,7 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use control::{
-    Braking, HoldConfig, Motion, MotionConfig, Tilt, Vector, VelocityConfig, VelocityController, hold_velocity,
+    Braking, HoldConfig, Motion, MotionConfig, Tilt, Vector, VelocityConfig, VelocityController,
+    hold_velocity,
 };
 use std::collections::VecDeque;
 
@@ -58,7 +59,7 @@ impl Flight {
             steps: 0,
             heading: 0.0,
             motion: Motion::new(MotionConfig::default()),
-            control: VelocityController::new(VelocityConfig::default()),
+            control: VelocityController::new(VelocityConfig::default(), MotionConfig::default().drag_per_s),
             gain: 1.0,
             late_ns: 70_000_000,
             position_sigma: 0.02,
@@ -90,7 +91,8 @@ impl Flight {
             let asked = self.link.pop_front().unwrap();
             // 12 rad/s, damping 0.75: 0.18 s to 90 %.
             let (w, z) = (12.0, 0.75);
-            let target = (asked.roll * self.gain + self.level.roll, asked.pitch * self.gain + self.level.pitch);
+            let target =
+                (asked.roll * self.gain + self.level.roll, asked.pitch * self.gain + self.level.pitch);
             self.rate.roll += (w * w * (target.0 - self.tilt.roll) - 2.0 * z * w * self.rate.roll) * 0.001;
             self.rate.pitch += (w * w * (target.1 - self.tilt.pitch) - 2.0 * z * w * self.rate.pitch) * 0.001;
             self.tilt.roll += self.rate.roll * 0.001;

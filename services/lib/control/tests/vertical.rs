@@ -177,7 +177,11 @@ fn holds_its_height_under_noise_gusts_and_sag() {
         }
         let rms = (squares / 3000.0).sqrt();
         assert!(rms < 0.06 && worst < 0.22, "seed {seed}: rms {rms}, worst {worst}");
-        assert!((flight.climb.hover_us() - flight.plant.hover_us).abs() < 25.0, "{}", flight.climb.hover_us());
+        assert!(
+            (flight.climb.hover_us() - flight.plant.hover_us).abs() < 25.0,
+            "{}",
+            flight.climb.hover_us()
+        );
     }
 }
 
@@ -293,7 +297,8 @@ fn a_fall_is_believed_although_it_is_faster_than_thrust_explains() {
 
 #[test]
 fn a_whole_flight_from_floor_to_floor() {
-    for (seed, hover, guess) in [(1, 1380.0, 1480.0), (2, 1450.0, 1450.0), (3, 1520.0, 1430.0), (4, 1600.0, 1500.0)]
+    for (seed, hover, guess) in
+        [(1, 1380.0, 1480.0), (2, 1450.0, 1450.0), (3, 1520.0, 1430.0), (4, 1600.0, 1500.0)]
     {
         for lie in [0.0, 0.08] {
             let mut flight = Flight::new(hover, guess, seed);

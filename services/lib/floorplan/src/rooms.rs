@@ -80,9 +80,11 @@ impl Rooms {
         let cell_m2 = plan.resolution() * plan.resolution();
         cores.retain(|cells| cells.len() as f32 * cell_m2 >= CORE_AREA_M2);
         if cores.is_empty() {
-            // A place too narrow to have a core anywhere is one room for each part of it.
+            // A place too narrow to have a core anywhere is one room for each part of it, specks left out.
             let free: Vec<bool> = plan.cells().iter().map(|cell| *cell == Cell::Free).collect();
             cores = components(plan, &free);
+            let largest = cores.iter().map(Vec::len).max().unwrap_or(0) as f32 * cell_m2;
+            cores.retain(|cells| cells.len() as f32 * cell_m2 >= CORE_AREA_M2.min(largest));
         }
         if cores.len() > MAX_ROOMS {
             cores.sort_by_key(|cells| std::cmp::Reverse(cells.len()));

@@ -5,9 +5,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use floorplan::{ConeModel, ConeTable, Plan, PlanHeader};
-use mcl::{
-    Config, Echo, Filter, Flow, Generator, Motion, ParticlesMut, ParticlesRef, Reading, Start, Sweep,
-};
+use mcl::{Config, Echo, Filter, Flow, Generator, Motion, ParticlesMut, ParticlesRef, Reading, Start, Sweep};
 use std::f32::consts::FRAC_PI_4;
 use std::hint::black_box;
 use std::path::Path;
@@ -27,9 +25,8 @@ fn plan() -> (String, Plan, (f32, f32)) {
     named.unwrap_or_else(|| {
         let rows: Vec<String> = (0..200)
             .map(|iy| {
-                let solid = |ix: usize| {
-                    ix % 199 == 0 || iy % 199 == 0 || (ix % 50 / 6 == 4 && iy % 50 / 6 == 4)
-                };
+                let solid =
+                    |ix: usize| ix % 199 == 0 || iy % 199 == 0 || (ix % 50 / 6 == 4 && iy % 50 / 6 == 4);
                 (0..200).map(|ix| if solid(ix) { '#' } else { ' ' }).collect()
             })
             .collect();
@@ -93,8 +90,14 @@ fn update(c: &mut Criterion) {
         group.throughput(Throughput::Elements(count as u64));
         group.bench_function(BenchmarkId::from_parameter(count), |b| {
             b.iter(|| {
-                let out =
-                    filter.update(old.read(), &memory, &motion, Some(black_box(&sweep)), new.write(), &mut generator);
+                let out = filter.update(
+                    old.read(),
+                    &memory,
+                    &motion,
+                    Some(black_box(&sweep)),
+                    new.write(),
+                    &mut generator,
+                );
                 memory = out.memory;
                 std::mem::swap(&mut old, &mut new);
                 out.estimate.x

@@ -91,7 +91,7 @@ pub struct PopulationConfig {
 
 impl Default for PopulationConfig {
     fn default() -> Self {
-        Self { min: 500, max: 4_000, error: 0.02, bin: 0.1, heading_bin: 0.17, velocity_bin: 0.2 }
+        Self { min: 600, max: 3_000, error: 0.04, bin: 0.1, heading_bin: 0.17, velocity_bin: 0.2 }
     }
 }
 

@@ -207,7 +207,11 @@ impl Summary {
         ]
         .map(|v| v.copied().unwrap_or(0.0));
         let all = moments(p, &origin, None);
-        let effective = if all.weight_squared > 0.0 { (all.weight * all.weight / all.weight_squared) as f32 } else { 0.0 };
+        let effective = if all.weight_squared > 0.0 {
+            (all.weight * all.weight / all.weight_squared) as f32
+        } else {
+            0.0
+        };
         let mut estimate = describe(&all, &origin, p_lost, effective, 1.0);
         let spread = [estimate.sigma(), estimate.sigma_across()];
         if spread[0] > WIDE_M {

@@ -124,7 +124,12 @@ impl<M: RangeMap> Filter<M> {
     }
 
     /// Writes a set around a known place into `next`, at rest.
-    pub fn start_at(&mut self, start: &Start, mut next: ParticlesMut<'_>, generator: &mut Generator) -> Update {
+    pub fn start_at(
+        &mut self,
+        start: &Start,
+        mut next: ParticlesMut<'_>,
+        generator: &mut Generator,
+    ) -> Update {
         let count = self.config.population.max.min(next.capacity()).min(self.ancestors.len());
         let mut lanes = Lanes::new(generator);
         let mut from = 0;
@@ -229,11 +234,8 @@ impl<M: RangeMap> Filter<M> {
             self.config.trust.step(memory.p_lost, motion.dt_s, core::iter::empty())
         };
         let (estimate, spread) = self.summary.of(&next.written(count), doubt);
-        let memory = Memory {
-            p_lost: doubt,
-            effective: estimate.effective,
-            wanted: self.wanted(&estimate, spread),
-        };
+        let memory =
+            Memory { p_lost: doubt, effective: estimate.effective, wanted: self.wanted(&estimate, spread) };
         let fits = sweep.map_or(0, |s| self.fits(s, &estimate));
         Update { count, estimate, memory, resampled, fits }
     }

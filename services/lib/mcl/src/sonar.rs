@@ -103,7 +103,8 @@ impl SonarModel {
                 let error = (z - expected) / sigma;
                 let gauss = (-0.5 * error * error).exp() / (sigma * TAU.sqrt());
                 // Unmapped things stand as near as 1 m on average; the exponential is cut at the wall.
-                let before = if z < expected { (-z).exp() / (1.0 - (-expected.max(NEAREST)).exp()) } else { 0.0 };
+                let before =
+                    if z < expected { (-z).exp() / (1.0 - (-expected.max(NEAREST)).exp()) } else { 0.0 };
                 self.hit() * gauss + c.short * before + c.random / reach
             }
         }
@@ -115,7 +116,9 @@ impl SonarModel {
         // them; echoes are the rarer the farther. Only the order of magnitude matters.
         match echo {
             Echo::Nothing => 0.4,
-            Echo::Range(z) => 0.6 * (-z / (0.6 * self.config.max_range)).exp() / (0.487 * self.config.max_range),
+            Echo::Range(z) => {
+                0.6 * (-z / (0.6 * self.config.max_range)).exp() / (0.487 * self.config.max_range)
+            }
         }
     }
 
@@ -336,8 +339,9 @@ mod tests {
     fn the_mixture_sums_to_one() {
         for expected in [0.5, 1.3, 2.0, 3.0, f32::INFINITY] {
             let step = 0.001;
-            let ranges: f32 =
-                (0..4000).map(|i| model().likelihood(Echo::Range((i as f32 + 0.5) * step), expected) * step).sum();
+            let ranges: f32 = (0..4000)
+                .map(|i| model().likelihood(Echo::Range((i as f32 + 0.5) * step), expected) * step)
+                .sum();
             let sum = ranges + model().likelihood(Echo::Nothing, expected);
             assert!((sum - 1.0).abs() < 0.02, "{expected}: {sum}");
         }

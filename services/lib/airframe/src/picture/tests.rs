@@ -22,7 +22,15 @@ fn a_picture_shows_paths_calls_and_escapes_names() {
         let estimate = (tick % 100 > 10).then_some((x + 0.05, y, 0.0));
         scorer.observe(&world, &Observation { time_s, x, y, yaw: 0.0, airborne: true, estimate });
         let clearance = world.clearance(x, y, 1.1, 0.2, 0.225);
-        track.observe(&world, time_s, (x, y), estimate.map(|e| (e.0, e.1)), clearance, (1.1, 0.2, 0.225), [(1.0, 1.0)]);
+        track.observe(
+            &world,
+            time_s,
+            (x, y),
+            estimate.map(|e| (e.0, e.1)),
+            clearance,
+            (1.1, 0.2, 0.225),
+            [(1.0, 1.0)],
+        );
     }
     let coverage = scorer.coverage().clone();
     let ending = Ending {

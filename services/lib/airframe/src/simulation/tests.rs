@@ -99,11 +99,9 @@ fn the_same_seed_flies_the_same_flight_and_another_one_does_not() {
     let run = |seed: u64| {
         let mut sim = flight(seed, ClutterLevel::Full);
         let mut text = String::new();
-        let mut ping = 0;
         for i in 0..8 {
             fly(&mut sim, 1.0, hold(4.0, 3.0));
-            sim.ping(1 << (i % 9), ping);
-            ping += 1;
+            sim.ping(1 << i, i);
             let mut flow = [0; 4096];
             let count = sim.flow_read(&mut flow);
             text += &format!("{:?} {:?}\n", sim.truth(), &flow[..count]);

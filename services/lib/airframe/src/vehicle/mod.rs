@@ -184,8 +184,8 @@ impl Quadrotor {
         let mut thrust = 0.0;
         let mut torque = Vector3::zeros();
         let mut watts = AVIONICS_W;
-        for i in 0..4 {
-            let wanted = commands[i].clamp(0.0, 1.0) * supply;
+        for (i, command) in commands.iter().enumerate() {
+            let wanted = command.clamp(0.0, 1.0) * supply;
             let before = self.speeds[i];
             let speed = wanted + (before - wanted) * keep;
             self.speeds[i] = speed;

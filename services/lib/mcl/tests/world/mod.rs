@@ -3,8 +3,8 @@
 
 use floorplan::{ConeModel, ConeTable, Plan};
 use mcl::{
-    Config, Echo, Estimate, Filter, Flow, Generator, Memory, Motion, ParticlesMut, ParticlesRef, Reading, Start,
-    Sweep,
+    Config, Echo, Estimate, Filter, Flow, Generator, Memory, Motion, ParticlesMut, ParticlesRef, Reading,
+    Start, Sweep,
 };
 use std::f32::consts::{FRAC_PI_4, PI};
 use std::sync::Arc;
@@ -73,13 +73,13 @@ const ROUND: &[(f32, f32)] = &[
     (2.5, 3.35),
 ];
 
-pub struct World {
+pub(crate) struct World {
     solid: Vec<Vec<bool>>,
     table: Arc<ConeTable>,
 }
 
 impl World {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let solid = BUILDING.iter().rev().map(|row| row.bytes().map(|c| c == b'#').collect()).collect();
         let fine: Vec<String> = BUILDING
             .iter()
@@ -142,17 +142,17 @@ impl World {
 
 /// What is to go wrong.
 #[derive(Clone)]
-pub struct Trial {
-    pub seed: u64,
-    pub seconds: f32,
-    pub flow: bool,
+pub(crate) struct Trial {
+    pub(crate) seed: u64,
+    pub(crate) seconds: f32,
+    pub(crate) flow: bool,
     /// Share of readings that are cut short by something unmapped.
-    pub wrong: f32,
+    pub(crate) wrong: f32,
     /// Size of the compass error, radians, over a wave of 20 m.
-    pub compass: f32,
+    pub(crate) compass: f32,
     /// Moved to this place, unknown to the filter, at this time.
-    pub kidnap: Option<(f32, (f32, f32))>,
-    pub config: Config,
+    pub(crate) kidnap: Option<(f32, (f32, f32))>,
+    pub(crate) config: Config,
 }
 
 impl Default for Trial {
@@ -169,54 +169,48 @@ impl Default for Trial {
     }
 }
 
-pub struct Moment {
-    pub time: f32,
-    pub error: f32,
-    pub heading_error: f32,
-    pub velocity_error: f32,
-    pub count: usize,
-    pub estimate: Estimate,
+pub(crate) struct Moment {
+    pub(crate) time: f32,
+    pub(crate) error: f32,
+    pub(crate) heading_error: f32,
+    pub(crate) velocity_error: f32,
+    pub(crate) count: usize,
+    pub(crate) estimate: Estimate,
 }
 
-pub struct Log(pub Vec<Moment>);
+pub(crate) struct Log(pub(crate) Vec<Moment>);
 
 impl Log {
-    pub fn quantile(&self, q: f32, value: impl Fn(&Moment) -> f32) -> f32 {
+    pub(crate) fn quantile(&self, q: f32, value: impl Fn(&Moment) -> f32) -> f32 {
         let mut values: Vec<f32> = self.0.iter().map(value).collect();
         values.sort_by(f32::total_cmp);
         values[((values.len() - 1) as f32 * q) as usize]
     }
-    pub fn print(&self, name: &str) {
-        eprintln!(
-            "{name}: error median {:.3} p95 {:.3} max {:.3} m, heading p50 {:.3} p95 {:.3} rad, velocity rms-ish p50 {:.3} p95 {:.3}, p_lost p50 {:.4} p95 {:.4} max {:.3}, particles p50 {} p95 {}, sigma p50 {:.3}",
-            self.quantile(0.5, |m| m.error),
-            self.quantile(0.95, |m| m.error),
-            self.quantile(1.0, |m| m.error),
-            self.quantile(0.5, |m| m.heading_error),
-            self.quantile(0.95, |m| m.heading_error),
-            self.quantile(0.5, |m| m.velocity_error),
-            self.quantile(0.95, |m| m.velocity_error),
-            self.quantile(0.5, |m| m.estimate.p_lost),
-            self.quantile(0.95, |m| m.estimate.p_lost),
-            self.quantile(1.0, |m| m.estimate.p_lost),
-            self.quantile(0.5, |m| m.count as f32),
-            self.quantile(0.95, |m| m.count as f32),
-            self.quantile(0.5, |m| m.estimate.sigma()),
-        );
+    /// What to say when a bound is missed.
+    pub(crate) fn summary(&self) -> String {
+        let line = |name: &str, value: &dyn Fn(&Moment) -> f32| {
+            let [median, p95, max] = [0.5, 0.95, 1.0].map(|q| self.quantile(q, value));
+            format!("{name} median {median:.3} p95 {p95:.3} max {max:.3}; ")
+        };
+        line("error m", &|m| m.error)
+            + &line("heading rad", &|m| m.heading_error)
+            + &line("velocity m/s", &|m| m.velocity_error)
+            + &line("P(lost)", &|m| m.estimate.p_lost)
+            + &line("particles", &|m| m.count as f32)
     }
 }
 
 /// A particle set in ordinary memory.
-pub struct Set {
+pub(crate) struct Set {
     columns: [Vec<f32>; 8],
     count: usize,
 }
 
 impl Set {
-    pub fn new(capacity: usize) -> Self {
+    pub(crate) fn new(capacity: usize) -> Self {
         Self { columns: std::array::from_fn(|_| vec![f32::NAN; capacity]), count: 0 }
     }
-    pub fn read(&self) -> ParticlesRef<'_> {
+    pub(crate) fn read(&self) -> ParticlesRef<'_> {
         let [x, y, vx, vy, ho, lr, lp, w] = &self.columns;
         let n = self.count;
         ParticlesRef {
@@ -230,7 +224,7 @@ impl Set {
             weight: &w[..n],
         }
     }
-    pub fn write(&mut self) -> ParticlesMut<'_> {
+    pub(crate) fn write(&mut self) -> ParticlesMut<'_> {
         let [x, y, vx, vy, ho, lr, lp, w] = &mut self.columns;
         ParticlesMut {
             x,
@@ -243,7 +237,7 @@ impl Set {
             weight: w,
         }
     }
-    pub fn set_count(&mut self, count: usize) {
+    pub(crate) fn set_count(&mut self, count: usize) {
         self.count = count;
     }
 }
@@ -257,7 +251,7 @@ const DT: f32 = 0.06;
 const GRAVITY: f32 = 9.81;
 
 /// Flies the round and filters along.
-pub fn fly(world: &World, trial: &Trial) -> Log {
+pub(crate) fn fly(world: &World, trial: &Trial) -> Log {
     let mut g = Generator::new(trial.seed);
     let mut filter = Filter::new(trial.config.clone(), Arc::clone(&world.table), 4_000).unwrap();
     let mut generator = Generator::new(trial.seed ^ 0x5eed);
@@ -267,7 +261,8 @@ pub fn fly(world: &World, trial: &Trial) -> Log {
     let scale = 1.0 + 0.01 * normal(&mut g);
     let phase = g.uniform() * 6.0;
     let base = 0.7;
-    let offset = |x: f32, y: f32| base + trial.compass * ((x + 0.5 * y) / 20.0 * std::f32::consts::TAU + phase).sin();
+    let offset =
+        |x: f32, y: f32| base + trial.compass * ((x + 0.5 * y) / 20.0 * std::f32::consts::TAU + phase).sin();
     let (mut x, mut y) = ROUND[0];
     let (mut vx, mut vy, mut heading) = (0.0f32, 0.0f32, 0.3f32);
     let mut gust = [0.0f32; 2];
@@ -321,8 +316,7 @@ pub fn fly(world: &World, trial: &Trial) -> Log {
             y += vy * h;
         }
         time += DT;
-        if let Some((at, place)) = kidnap.filter(|k| time >= k.0) {
-            let _ = at;
+        if let Some((_, place)) = kidnap.filter(|k| time >= k.0) {
             (x, y) = place;
             (vx, vy) = (0.0, 0.0);
             kidnap = None;

@@ -1,0 +1,370 @@
+//! The service.
+
+use crate::LocalizationConfig;
+use crate::attitude::{Attitudes, seconds};
+use crate::flow::Flows;
+use crate::pose::{Walls, fill};
+use crate::predict::{Dynamics, predict};
+use crate::set::{MEMORY_GROUNDED, Set, columns, columns_mut, fold};
+use crate::start::{Place, place};
+use crate::sweep::{Group, Waiting};
+use floorplan::{ConeModel, ConeTable};
+use ipc_types::{
+    Attitude, FlowMotion, LocalizationState, MAX_PARTICLES, Particles, PilotState, Pose, SonarRanges, Text,
+};
+use mcl::{Estimate, Filter, Generator, Memory, Motion, Sweep, wrap_angle};
+use runtime::{Input, Output, Ports, Service, Start, StartError};
+use std::fmt::Write;
+use std::sync::Arc;
+
+/// Attitudes averaged before the first set is drawn: a quarter of a second at 30 Hz, enough for the whole
+/// degrees in which a controller gives its yaw.
+const RESTING_SAMPLES: usize = 8;
+/// Tilt on the ground beyond which it is the ground that slopes, radians; the level error of a calibrated
+/// controller is smaller.
+const LARGEST_LEVEL: f32 = 0.05;
+/// The set is moved without a ping up to this long before now, seconds: attitudes and flow are that late.
+const BEHIND_S: f64 = 0.04;
+/// Doubt of a set that was drawn in the air because nothing better was left.
+const HOPELESS: f32 = 0.9;
+/// After so long, nanoseconds, a set that was sent and did not come back is given up and the last one that
+/// did is used again.
+const ECHO_TIMEOUT_NS: u64 = 100_000_000;
+
+/// Follows the drone on the plan.
+pub struct Localization {
+    ranges: Input<SonarRanges>,
+    attitude: Input<Attitude>,
+    flow: Input<FlowMotion>,
+    pilot: Input<PilotState>,
+    sets: Input<Particles>,
+    poses: Output<Pose>,
+    particles: Output<Particles>,
+
+    config: LocalizationConfig,
+    filter: Filter<Arc<ConeTable>>,
+    plan: u32,
+    pad: Place,
+    seed: u64,
+
+    attitudes: Attitudes,
+    flows: Flows,
+    waiting: Waiting,
+    walls: Walls,
+    set: Set,
+    /// Number and time of the last set sent.
+    sent: u64,
+    sent_ns: u64,
+    grounded: bool,
+    believed: Option<Believed>,
+    next_pose_ns: u64,
+    refused: u64,
+}
+
+/// The last update's result.
+#[derive(Clone, Copy)]
+struct Believed {
+    time_ns: u64,
+    estimate: Estimate,
+    count: usize,
+}
+
+impl Service for Localization {
+    const NAME: &'static str = "localization";
+    type Config = LocalizationConfig;
+
+    fn start(config: LocalizationConfig, ports: &mut Ports, start: &Start) -> Result<Self, StartError> {
+        let plan = start.plan()?;
+        let pad = place(&config.start, start, &plan)?;
+        let hash = fold(plan.hash());
+        let model = ConeModel { max_range_m: config.sonar.max_range, ..ConeModel::default() };
+        let table = start.shared(&format!("cone table {model:?}"), || {
+            let table = ConeTable::new(plan, model);
+            // No look-up in flight is to allocate.
+            table.allocate();
+            Ok(table)
+        })?;
+        let filter = Filter::new(config.filter(), table, MAX_PARTICLES).map_err(StartError::invalid)?;
+        let mut service = Self {
+            ranges: ports.input(8)?,
+            attitude: ports.input(16)?,
+            flow: ports.input(16)?,
+            pilot: ports.input(4)?,
+            sets: ports.input(1)?,
+            poses: ports.output()?,
+            particles: ports.output()?,
+            config,
+            filter,
+            plan: hash,
+            pad,
+            seed: start.seed,
+            attitudes: Attitudes::default(),
+            flows: Flows::default(),
+            waiting: Waiting::default(),
+            walls: Walls::default(),
+            set: Set::None,
+            sent: 0,
+            sent_ns: 0,
+            grounded: true,
+            believed: None,
+            next_pose_ns: 0,
+            refused: 0,
+        };
+        if let Some(kept) = ports.retained::<Particles>()? {
+            service.resume(kept);
+        }
+        Ok(service)
+    }
+
+    fn step(&mut self, now: u64) {
+        self.listen(now);
+        if self.set_is_back(now) {
+            self.advance(now);
+        }
+        self.publish(now);
+    }
+
+    fn status(&self, text: &mut Text<96>) {
+        // A text that is full is full.
+        let _ = match &self.believed {
+            None => write!(text, "waiting for the attitude"),
+            Some(b) => {
+                let e = &b.estimate;
+                let state = match e.state {
+                    mcl::State::Lost => LocalizationState::Lost,
+                    mcl::State::Converging => LocalizationState::Converging,
+                    mcl::State::Tracking => LocalizationState::Tracking,
+                };
+                write!(
+                    text,
+                    "{state} at {:.2} {:.2}, sigma {:.2} m, P(lost) {:.3}, {} particles",
+                    e.x,
+                    e.y,
+                    e.sigma(),
+                    e.p_lost,
+                    b.count
+                )
+            }
+        };
+    }
+
+    fn refused(&self) -> u64 {
+        self.refused
+    }
+}
+
+impl Localization {
+    /// Goes on from what the keeper held, if it is sound and of this plan.
+    fn resume(&mut self, mut kept: Box<Particles>) {
+        let sound = kept.plan == self.plan
+            && kept.count as usize <= MAX_PARTICLES
+            && kept.estimated_ns > 0
+            && columns(&kept).check().is_ok();
+        if !sound {
+            self.refused += 1;
+            return;
+        }
+        // What happened meanwhile is unknown: search with all there is.
+        let mut memory = Memory::from_array(&kept.memory);
+        memory.wanted = self.config.population.max as f32;
+        self.grounded = kept.memory[MEMORY_GROUNDED] == 1.0;
+        kept.memory[..15].copy_from_slice(&memory.to_array()[..15]);
+        self.sent = kept.updates;
+        self.set = Set::Kept(kept);
+    }
+
+    /// Drains the inputs.
+    fn listen(&mut self, now: u64) {
+        while let Some(a) = self.attitude.receive() {
+            // Times ahead of ours would stop the history until they are reached.
+            let taken =
+                a.sampled_ns <= now && self.attitudes.push(a.sampled_ns, a.roll_rad, a.pitch_rad, a.yaw_rad);
+            self.refused += u64::from(!taken);
+        }
+        while let Some(state) = self.pilot.receive() {
+            self.grounded = state.on_ground == 1;
+        }
+        while let Some(frame) = self.flow.receive() {
+            let velocity = [frame.velocity_x_m_s, frame.velocity_y_m_s];
+            if velocity.iter().any(|v| v.is_nan()) {
+                continue;
+            }
+            if frame.sampled_ns > now || !self.flows.push(frame.sampled_ns, velocity, frame.sigma_m_s) {
+                self.refused += 1;
+                continue;
+            }
+            if let Some(b) = &self.believed {
+                let p = self.predicted(b, frame.sampled_ns, false);
+                let (sin, cos) = p.heading.sin_cos();
+                let [x, y] = p.velocity;
+                self.flows.gate([cos * x + sin * y, -sin * x + cos * y]);
+            }
+        }
+        while let Some(message) = self.ranges.receive() {
+            match Group::of(&message, now) {
+                Some(group) => self.waiting.push(group),
+                None => self.refused += 1,
+            }
+        }
+        // One at a time, each in the place of the one before: a reader may hold two.
+        while let Some(set) = self.sets.receive() {
+            if set.plan == self.plan && set.count as usize <= MAX_PARTICLES && set.count > 0 {
+                self.set = Set::Live(set);
+            } else {
+                self.refused += 1;
+            }
+        }
+    }
+
+    /// Whether the last set sent has come back, or is not to be waited for any longer.
+    fn set_is_back(&self, now: u64) -> bool {
+        match self.set.get() {
+            Some(set) => set.updates >= self.sent || now.saturating_sub(self.sent_ns) > ECHO_TIMEOUT_NS,
+            None => self.sent == 0 || now.saturating_sub(self.sent_ns) > ECHO_TIMEOUT_NS,
+        }
+    }
+
+    /// One update, when there is something to update by.
+    fn advance(&mut self, now: u64) {
+        let Some(set) = self.set.get() else {
+            self.begin(now);
+            return;
+        };
+        let time_ns = set.estimated_ns;
+        if seconds(time_ns, now) > self.config.max_age_s {
+            // Only a restart after a long death comes here: a live filter updates itself when all is silent.
+            self.set = Set::None;
+            self.begin(now);
+            return;
+        }
+        if self.attitudes.is_empty() {
+            return;
+        }
+        if let Some(group) = self.waiting.pop() {
+            self.update(group.time_ns.max(time_ns), Some(&group), now);
+        } else if seconds(time_ns, now) > self.config.silent_s {
+            let to = now.saturating_sub((BEHIND_S * 1e9) as u64);
+            self.update(to.max(time_ns), None, now);
+        }
+    }
+
+    /// Draws the first set around the start, once the attitude has settled.
+    fn begin(&mut self, now: u64) {
+        if self.attitudes.len() < RESTING_SAMPLES {
+            return;
+        }
+        let (Some(resting), Some(mut loan)) = (self.attitudes.resting(), self.particles.loan()) else {
+            return;
+        };
+        let level = |angle: f32| if self.grounded { angle.clamp(-LARGEST_LEVEL, LARGEST_LEVEL) } else { 0.0 };
+        let start = &self.config.start;
+        let start = mcl::Start {
+            x: self.pad.x,
+            y: self.pad.y,
+            sigma: start.sigma_m,
+            heading_offset: wrap_angle(self.pad.heading - resting.yaw),
+            heading_sigma: start.heading_sigma_deg.to_radians(),
+            level_roll: level(resting.roll),
+            level_pitch: level(resting.pitch),
+            level_sigma: start.level_sigma_deg.to_radians(),
+            p_lost: if self.grounded { 0.01 } else { HOPELESS },
+        };
+        let mut generator = Generator::new(self.seed);
+        let update = self.filter.start_at(&start, columns_mut(&mut loan), &mut generator);
+        loan.estimated_ns = now;
+        loan.updates = self.sent + 1;
+        loan.generator = generator.state();
+        loan.memory = self.remember(&update.memory);
+        loan.count = update.count as u32;
+        loan.plan = self.plan;
+        loan.send();
+        self.sent += 1;
+        self.sent_ns = now;
+        self.believed = Some(Believed { time_ns: now, estimate: update.estimate, count: update.count });
+    }
+
+    /// Reads the last set, writes the next for `time_ns` into a fresh loan and sends it.
+    fn update(&mut self, time_ns: u64, group: Option<&Group>, now: u64) {
+        let Some(set) = self.set.get() else { return };
+        let Some(mut loan) = self.particles.loan() else { return };
+        let memory = Memory::from_array(&set.memory);
+        let level = self.believed.map_or([0.0; 2], |b| [b.estimate.level_roll, b.estimate.level_pitch]);
+        let mean = self.attitudes.mean(set.estimated_ns, time_ns);
+        let motion = Motion {
+            dt_s: seconds(set.estimated_ns, time_ns) as f32,
+            blind_s: mean.blind_s,
+            roll_rad: mean.roll,
+            pitch_rad: mean.pitch,
+            yaw_rad: mean.yaw,
+            flow: self.flows.take(time_ns, &self.attitudes, level),
+            grounded: self.grounded,
+        };
+        let then = self.attitudes.at(time_ns).unwrap_or_default();
+        let sweep = group.map(|g| Sweep {
+            readings: g.readings(),
+            roll_rad: then.roll - level[0],
+            pitch_rad: then.pitch - level[1],
+            yaw_rad: then.yaw,
+        });
+        let mut generator = Generator::from_state(set.generator);
+        let update = self.filter.update(
+            columns(set),
+            &memory,
+            &motion,
+            sweep.as_ref(),
+            columns_mut(&mut loan),
+            &mut generator,
+        );
+        if update.count == 0 {
+            return;
+        }
+        if let Some(group) = group {
+            self.walls.take(&group.sensors[..group.count], update.fits, time_ns);
+        }
+        loan.estimated_ns = time_ns;
+        loan.updates = self.sent + 1;
+        loan.generator = generator.state();
+        loan.memory = self.remember(&update.memory);
+        loan.count = update.count as u32;
+        loan.plan = self.plan;
+        loan.send();
+        self.sent += 1;
+        self.sent_ns = now;
+        self.believed = Some(Believed { time_ns, estimate: update.estimate, count: update.count });
+    }
+
+    fn remember(&self, memory: &Memory) -> [f32; 16] {
+        let mut out = memory.to_array();
+        out[MEMORY_GROUNDED] = if self.grounded { 1.0 } else { 0.0 };
+        out
+    }
+
+    fn predicted(&self, b: &Believed, to_ns: u64, with_flow: bool) -> crate::predict::Predicted {
+        let motion = &self.config.motion;
+        let dynamics = Dynamics { drag: motion.drag, velocity_noise: motion.velocity_noise };
+        let flows = if with_flow { self.flows.waiting() } else { &[] };
+        let mut p = predict(&b.estimate, dynamics, b.time_ns, to_ns, &self.attitudes, flows);
+        if self.grounded {
+            p.position = [b.estimate.x, b.estimate.y];
+            p.velocity = [0.0; 2];
+            p.variance = 0.0;
+        }
+        p
+    }
+
+    /// The pose for now.
+    fn publish(&mut self, now: u64) {
+        // A tick a millisecond early is the tick that was meant.
+        if now + 1_000_000 < self.next_pose_ns {
+            return;
+        }
+        let Some(b) = self.believed else { return };
+        let p = self.predicted(&b, now, true);
+        let walls = self.walls.in_echo(now);
+        if let Some(mut pose) = self.poses.loan() {
+            fill(&mut pose, now, &b.estimate, &p, b.count, walls);
+            pose.send();
+        }
+        self.next_pose_ns = now + (1e9 / self.config.pose_hz) as u64;
+    }
+}

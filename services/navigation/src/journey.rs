@@ -1,0 +1,606 @@
+//! The route: planned in slices, followed, planned again when something stands in the way.
+
+use crate::atlas::Atlas;
+use crate::mission::Goal;
+use crate::place::Place;
+use crate::steer::STANDS_CERTAINTY;
+use crate::track::{MAX_CORNERS, SHORTEST_M, Track};
+use avoid::Window;
+use avoid::swath::for_each_certain;
+use core::fmt::{self, Write};
+use ipc_types::{MAX_WAYPOINTS, RoomProgress, Text};
+use patrol::{Bits, Costmap, Obstacle, Progress, RoomPlan, Round, RoutePlanner, Seen, Step, Stop, Tally};
+use std::sync::Arc;
+
+/// One slice of working out a round: about 2 ms here, 5 ms on a Pi 4, of the 50 ms between decisions.
+const ROUND_UNITS: usize = 600_000;
+/// One slice of a route, in cells of 0.1 us.
+const ROUTE_NODES: usize = 15_000;
+/// Distance flown between two looks, metres: the view reaches 20 times as far.
+const LOOK_EVERY_M: f32 = 0.15;
+/// Looks remembered: more than a kilometre.
+const MAX_LOOKS: usize = 8192;
+/// Looks worked out again in a slice: about 30 us each.
+const LOOKS_A_SLICE: usize = 60;
+/// Things are taken for standing in the way this far ahead and this far to the side, metres.
+const AHEAD_M: f32 = 1.3;
+const BESIDE_M: f32 = 0.45;
+/// A blockage nearer than this to a door's line is the door, metres: a leaf is ajar by a little.
+const DOOR_M: f32 = 0.35;
+/// Half of the stretch stamped when nothing was seen and still there was no progress, metres.
+const UNSEEN_HALF_M: f32 = 0.15;
+/// Stops nearer together than this are the same place, metres.
+const SAME_STOP_M: f32 = 0.6;
+/// Places that are given up for one round at most.
+const MAX_GIVEN_UP: usize = 64;
+/// Planning that failed is tried again with a clean slate this often.
+const FRESH_STARTS: u32 = 4;
+/// Marks nearer to the drone than this are forgotten when it is walled in by them, metres.
+const FORGET_M: f32 = 1.0;
+/// Work slices between two looks whether the next stops are still worth the way: once a second.
+const TRIM_EVERY: u32 = 20;
+/// Stops asked in one go whether they are still worth the way.
+const TRIM_AHEAD: usize = 4;
+/// A stop this near is flown to in any case, metres.
+const TRIM_NEAR_M: f32 = 0.6;
+
+/// What a slice of work came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// Nothing to plan.
+    Idle,
+    /// Not ready.
+    Busy,
+    /// There is a route to follow now.
+    Ready,
+    /// There is none.
+    NoWay,
+}
+
+/// A corner of the route.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Corner {
+    pub(crate) x: f32,
+    pub(crate) y: f32,
+    pub(crate) room: Option<usize>,
+    /// The stop that the way leads to ends here.
+    pub(crate) stop: Option<usize>,
+}
+
+#[derive(Debug)]
+enum Stage {
+    Idle,
+    /// What was seen is worked out again on a map that has changed: looks done so far.
+    Review(usize),
+    /// Asked for, not begun.
+    Asked,
+    Round(Box<Round>),
+    /// Leg to the stop of this index is being searched.
+    Leg(usize),
+    /// A shorter way past stops that have been seen meanwhile, to the stop of this index.
+    Trim(usize),
+    /// All legs are there.
+    Ready,
+}
+
+/// The route and what belongs to it.
+#[derive(Debug)]
+pub struct Journey {
+    pub(crate) atlas: Arc<Atlas>,
+    pub(crate) map: Costmap,
+    pub(crate) seen: Seen,
+    pub(crate) to_see: Bits,
+    pub(crate) rooms: Vec<RoomPlan>,
+    /// Why each room is left out; empty where it is not.
+    pub(crate) reasons: Vec<Text<64>>,
+    pub(crate) tallies: Vec<Tally>,
+    planner: RoutePlanner,
+    stage: Stage,
+    stops: Vec<Stop>,
+    /// Stop that is flown to.
+    target: usize,
+    pub(crate) corners: Vec<Corner>,
+    track: Track,
+    /// Where the drone looked about since start, and what had been seen before.
+    looks: Vec<(f32, f32)>,
+    seen_before: Bits,
+    /// A door was taken for open that is shut: what was seen through it was not.
+    review: bool,
+    /// Coverage and rooms as a restart found them, until a round is planned.
+    pub(crate) kept: Option<(f32, Vec<RoomProgress>)>,
+    max_tries: u32,
+    tried: (f32, f32),
+    tries: u32,
+    given_up: Vec<(f32, f32)>,
+    fresh_starts: u32,
+    since_trim: u32,
+    round: bool,
+    trouble: Text<64>,
+}
+
+impl Journey {
+    /// No route yet.
+    #[must_use]
+    pub fn new(atlas: Arc<Atlas>, max_tries: u32) -> Self {
+        let map = atlas.map().clone();
+        let rooms = atlas.rooms().len();
+        Self {
+            seen: Seen::new(&map),
+            planner: RoutePlanner::new(&map),
+            to_see: Bits::default(),
+            rooms: vec![RoomPlan::default(); rooms],
+            reasons: vec![Text::default(); rooms],
+            tallies: vec![Tally::default(); rooms],
+            stage: Stage::Idle,
+            stops: Vec::new(),
+            target: 0,
+            corners: Vec::with_capacity(MAX_CORNERS),
+            track: Track::new(),
+            looks: Vec::with_capacity(MAX_LOOKS),
+            seen_before: Bits::default(),
+            review: false,
+            kept: None,
+            max_tries,
+            tried: (f32::NAN, f32::NAN),
+            tries: 0,
+            given_up: Vec::with_capacity(MAX_GIVEN_UP),
+            fresh_starts: 0,
+            since_trim: 0,
+            round: false,
+            trouble: Text::default(),
+            map,
+            atlas,
+        }
+    }
+
+    /// Forgets everything that an earlier round has seen.
+    pub fn new_round(&mut self) {
+        self.map = self.atlas.map().clone();
+        self.seen = Seen::new(&self.map);
+        self.to_see = Bits::default();
+        self.rooms.fill(RoomPlan::default());
+        self.reasons.fill(Text::default());
+        self.given_up.clear();
+        self.tries = 0;
+        self.looks.clear();
+        self.seen_before.clear();
+        self.review = false;
+        self.kept = None;
+    }
+
+    /// Takes over what an earlier run has seen.
+    pub(crate) fn restore_seen(&mut self, words: &[u64]) {
+        self.seen_before.copy_from_words(words);
+        self.seen.restore(words);
+    }
+
+    /// Asks for a route from wherever the drone is when the planning begins.
+    pub fn plan(&mut self) {
+        self.drop_route();
+        self.stage = Stage::Asked;
+        self.fresh_starts = 0;
+    }
+
+    /// No route, and none wanted.
+    pub fn drop_route(&mut self) {
+        self.stage = Stage::Idle;
+        self.stops.clear();
+        self.corners.clear();
+        self.track.clear();
+        self.target = 0;
+    }
+
+    /// Whether there is a route to follow.
+    #[must_use]
+    pub fn planned(&self) -> bool {
+        !self.track.is_empty()
+    }
+
+    /// Whether the route is known to its end.
+    #[must_use]
+    pub fn complete(&self) -> bool {
+        matches!(self.stage, Stage::Ready | Stage::Trim(_))
+    }
+
+    /// The line to follow.
+    #[must_use]
+    pub fn track(&self) -> &Track {
+        &self.track
+    }
+
+    /// Where the drone may fly, with what was found.
+    #[must_use]
+    pub fn map(&self) -> &Costmap {
+        &self.map
+    }
+
+    /// Share of what there is to see that has been seen, 0..1; 0 before a round was planned.
+    #[must_use]
+    pub fn coverage(&self) -> f32 {
+        let total = self.seen.total(&self.to_see);
+        let kept = self.kept.as_ref().map_or(0.0, |(coverage, _)| *coverage);
+        if total.all == 0 { kept } else { total.share() }
+    }
+
+    /// Why there is no way on; empty without trouble.
+    #[must_use]
+    pub fn trouble(&self) -> &str {
+        self.trouble.as_str()
+    }
+
+    /// Whether the round is flown and only the way to the pad is left.
+    #[must_use]
+    pub fn homeward(&self) -> bool {
+        self.round
+            && self.complete()
+            && !self.stops[self.target.min(self.stops.len())..].iter().any(|stop| stop.look)
+    }
+
+    /// What the present leg is for.
+    ///
+    /// # Errors
+    /// Only what `out` itself reports.
+    pub fn write_errand(&self, out: &mut dyn Write) -> fmt::Result {
+        let looks = self.stops.iter().filter(|stop| stop.look).count();
+        match self.stops.get(self.target) {
+            Some(stop) if stop.look => {
+                let room = stop.room.map_or("the building", |room| self.atlas.rooms().name(room));
+                write!(out, "looking at {room}: place {} of {looks}", self.target + 1)
+            }
+            _ => write!(out, "flying back to the pad"),
+        }
+    }
+
+    /// Marks what is in sight.
+    pub fn see(&mut self, place: &Place) {
+        if self.looks.last().is_none_or(|looked| place.distance(*looked) >= LOOK_EVERY_M) {
+            self.seen.mark(&self.map, place.x, place.y);
+            if self.looks.len() == MAX_LOOKS {
+                self.seen_before.copy_from_words(self.seen.bits().words());
+                self.looks.clear();
+            }
+            self.looks.push((place.x, place.y));
+        }
+    }
+
+    /// Moves the progress along the route.
+    pub fn advance(&mut self, place: &Place) {
+        self.track.advance(place.x, place.y);
+        let next = self.track.next();
+        while let Some(stop) = self.stops.get(self.target) {
+            let passed = self.corners[..next.min(self.corners.len())]
+                .iter()
+                .any(|corner| corner.stop == Some(self.target));
+            if !(passed && stop.look) {
+                break;
+            }
+            self.target += 1;
+            self.since_trim = TRIM_EVERY;
+        }
+    }
+
+    /// One bounded slice of planning. Allocates; never part of a decision.
+    pub fn work(&mut self, goal: Goal, place: &Place, pad: Option<(f32, f32)>) -> Work {
+        match core::mem::replace(&mut self.stage, Stage::Idle) {
+            Stage::Idle => Work::Idle,
+            Stage::Asked if self.review => {
+                self.review = false;
+                self.seen.restore(self.seen_before.words());
+                self.stage = Stage::Review(0);
+                Work::Busy
+            }
+            Stage::Asked => self.begin(goal, place, pad),
+            Stage::Review(done) => {
+                for (x, y) in self.looks.iter().skip(done).take(LOOKS_A_SLICE) {
+                    self.seen.mark(&self.map, *x, *y);
+                }
+                let done = done + LOOKS_A_SLICE;
+                self.stage = if done < self.looks.len() { Stage::Review(done) } else { Stage::Asked };
+                Work::Busy
+            }
+            Stage::Round(round) => self.work_on_round(round, place),
+            Stage::Leg(stop) => self.work_on_leg(stop, place),
+            Stage::Trim(stop) => self.work_on_trim(stop),
+            Stage::Ready => {
+                self.stage = Stage::Ready;
+                self.consider_trim(place);
+                Work::Idle
+            }
+        }
+    }
+
+    fn begin(&mut self, goal: Goal, place: &Place, pad: Option<(f32, f32)>) -> Work {
+        self.round = goal == Goal::Round;
+        let to = match (goal, pad) {
+            (Goal::None, _) => return Work::Idle,
+            (Goal::There(there), _) => there,
+            (Goal::Home | Goal::Round, None) => return self.no_way("the pad is not known"),
+            (Goal::Round, Some(pad)) => {
+                let from = (place.x, place.y);
+                let round = Round::new(&self.map, self.rooms.len(), from, pad, &self.seen);
+                self.stage = Stage::Round(Box::new(round));
+                return Work::Busy;
+            }
+            (Goal::Home, Some(pad)) => pad,
+        };
+        self.stops.clear();
+        self.stops.push(Stop { x: to.0, y: to.1, room: None, look: false });
+        self.begin_leg(0, (place.x, place.y))
+    }
+
+    fn work_on_round(&mut self, mut round: Box<Round>, place: &Place) -> Work {
+        match round.advance(&self.map, &self.seen, ROUND_UNITS) {
+            Progress::Working => {
+                self.stage = Stage::Round(round);
+                Work::Busy
+            }
+            Progress::Failed => self.start_afresh(place, "the drone is walled in"),
+            Progress::Done => {
+                self.to_see = round.to_see().clone();
+                self.kept = None;
+                for (room, found) in round.rooms().iter().enumerate().take(self.rooms.len()) {
+                    self.rooms[room] = *found;
+                    let name = self.atlas.rooms().name(room);
+                    let reason = found.skipped.map(|obstacle| obstacle.reason(name, self.map.doors()));
+                    self.reasons[room].set(reason.as_deref().unwrap_or_default());
+                }
+                let given_up = &self.given_up;
+                let wanted = |stop: &&Stop| {
+                    !stop.look || !given_up.iter().any(|(x, y)| (x - stop.x).hypot(y - stop.y) < SAME_STOP_M)
+                };
+                self.stops.clear();
+                self.stops.extend(round.stops().iter().filter(wanted));
+                self.begin_leg(0, (place.x, place.y))
+            }
+        }
+    }
+
+    fn begin_leg(&mut self, stop: usize, from: (f32, f32)) -> Work {
+        let Some(to) = self.stops.get(stop) else {
+            self.stage = Stage::Ready;
+            return Work::Idle;
+        };
+        self.planner.begin(&self.map, from, (to.x, to.y));
+        self.stage = Stage::Leg(stop);
+        Work::Busy
+    }
+
+    fn work_on_leg(&mut self, stop: usize, place: &Place) -> Work {
+        if self.corners.len() + 200 > MAX_WAYPOINTS && stop > self.target + 1 {
+            // A route of this length is planned as it is flown.
+            self.forget_passed();
+            if self.corners.len() + 200 > MAX_WAYPOINTS {
+                self.stage = Stage::Leg(stop);
+                return Work::Idle;
+            }
+        }
+        match self.planner.advance(&self.map, ROUTE_NODES) {
+            Step::Working => {
+                self.stage = Stage::Leg(stop);
+                Work::Busy
+            }
+            Step::Found => {
+                let first = self.track.is_empty();
+                self.append_leg(stop);
+                let from = self.end_of_route().unwrap_or((place.x, place.y));
+                self.begin_leg(stop + 1, from);
+                if first { Work::Ready } else { Work::Busy }
+            }
+            Step::None => {
+                let last = stop + 1 == self.stops.len();
+                if last && self.track.is_empty() {
+                    let reason = self.planner.obstacle().unwrap_or(Obstacle::NoWay);
+                    let mut text = Text::<64>::default();
+                    // What does not fit is cut.
+                    let _ = write!(text, "no way on: {reason}");
+                    return self.start_afresh(place, text.as_str());
+                }
+                let from = self.end_of_route().unwrap_or((place.x, place.y));
+                if last {
+                    // The way home is asked for again, from nearer by, when the rest is flown.
+                    self.stops.truncate(stop);
+                    self.stage = Stage::Ready;
+                    return Work::Idle;
+                }
+                self.stops.remove(stop);
+                self.begin_leg(stop, from)
+            }
+        }
+    }
+
+    /// Plans again with a clean slate around the drone; gives up after a few times.
+    fn start_afresh(&mut self, place: &Place, why: &str) -> Work {
+        if self.fresh_starts >= FRESH_STARTS {
+            return self.no_way(why);
+        }
+        self.fresh_starts += 1;
+        if self.fresh_starts == 1 {
+            self.map.forget_unmapped(place.x, place.y, FORGET_M);
+        } else {
+            // What stood there may have gone, and a door may have been opened.
+            self.map.set_unmapped(&Bits::default());
+            for door in 0..self.map.doors().len() {
+                self.map.set_door(door, false);
+            }
+        }
+        self.stage = Stage::Asked;
+        Work::Busy
+    }
+
+    fn no_way(&mut self, why: &str) -> Work {
+        self.drop_route();
+        self.trouble = Text::new(why);
+        Work::NoWay
+    }
+
+    fn end_of_route(&self) -> Option<(f32, f32)> {
+        self.corners.last().map(|corner| (corner.x, corner.y))
+    }
+
+    /// Adds a point to corners and track; one that repeats the last only names its stop.
+    fn push_corner(&mut self, (x, y): (f32, f32), stop: Option<usize>) {
+        if let Some(last) = self.corners.last_mut()
+            && (last.x - x).hypot(last.y - y) < 2.0 * SHORTEST_M
+        {
+            last.stop = stop.or(last.stop);
+            return;
+        }
+        if self.corners.len() < MAX_WAYPOINTS && self.track.push(x, y) {
+            let room = self.map.raster().cell(x, y).and_then(|cell| self.map.room_of(cell));
+            self.corners.push(Corner { x, y, room, stop });
+        }
+    }
+
+    fn append_leg(&mut self, stop: usize) {
+        let count = self.planner.route().points.len();
+        for i in 0..count {
+            let point = self.planner.route().points[i];
+            self.push_corner(point, (i + 1 == count).then_some(stop));
+        }
+    }
+
+    /// Drops the corners that are passed, to make room for those to come.
+    fn forget_passed(&mut self) {
+        let passed = self.track.next().saturating_sub(1).min(self.corners.len());
+        self.corners.drain(..passed);
+        self.track.forget(passed);
+    }
+
+    /// Looks whether the next stops have been seen from the way there.
+    fn consider_trim(&mut self, place: &Place) {
+        self.since_trim += 1;
+        if self.since_trim < TRIM_EVERY || !self.round {
+            return;
+        }
+        self.since_trim = 0;
+        let near =
+            self.stops.get(self.target).is_some_and(|stop| place.distance((stop.x, stop.y)) < TRIM_NEAR_M);
+        if near {
+            return;
+        }
+        let least = self.map.limits().least_gain_m2;
+        let seen = self.stops[self.target.min(self.stops.len())..]
+            .iter()
+            .take(TRIM_AHEAD)
+            .take_while(|stop| {
+                stop.look && self.seen.gain_m2(&self.map, &self.to_see, stop.x, stop.y) < least
+            })
+            .count();
+        let to = self.target + seen;
+        if seen > 0
+            && let Some(stop) = self.stops.get(to)
+        {
+            self.planner.begin(&self.map, (place.x, place.y), (stop.x, stop.y));
+            self.stage = Stage::Trim(to);
+        }
+    }
+
+    fn work_on_trim(&mut self, to: usize) -> Work {
+        match self.planner.advance(&self.map, ROUTE_NODES) {
+            Step::Working => self.stage = Stage::Trim(to),
+            Step::None => self.stage = Stage::Ready,
+            Step::Found => {
+                let after =
+                    self.corners.iter().position(|corner| corner.stop == Some(to)).map_or(0, |at| at + 1);
+                let rest: Vec<Corner> = self.corners.drain(..).skip(after).collect();
+                self.track.clear();
+                self.append_leg(to);
+                for corner in rest {
+                    self.push_corner((corner.x, corner.y), corner.stop);
+                }
+                self.target = to;
+                self.stage = Stage::Ready;
+            }
+        }
+        Work::Idle
+    }
+
+    /// Something stands in the way (`seen_by_sonar`) or the drone does not get on: remembers it, and gives
+    /// the place up that it was flying to after a number of tries. `towards` is the direction of the way.
+    pub fn obstruct(
+        &mut self,
+        place: &Place,
+        towards: f32,
+        cells: &[u8],
+        window: &Window,
+        seen_by_sonar: bool,
+    ) {
+        if !towards.is_finite() {
+            return;
+        }
+        let (sin, cos) = towards.sin_cos();
+        let mut nearest = f32::INFINITY;
+        if seen_by_sonar {
+            let map = &mut self.map;
+            for_each_certain(cells, STANDS_CERTAINTY, |index| {
+                let (x, y) = window.centre(index);
+                let (dx, dy) = (x - place.x, y - place.y);
+                let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
+                if along > 0.0 && along < AHEAD_M && aside.abs() < BESIDE_M {
+                    map.mark_unmapped(x, y);
+                    nearest = nearest.min(along);
+                }
+            });
+        }
+        if !nearest.is_finite() {
+            nearest = self.map.limits().radius_m + UNSEEN_HALF_M;
+            for aside in [-UNSEEN_HALF_M, 0.0, UNSEEN_HALF_M] {
+                self.map.mark_unmapped(
+                    place.x + nearest * cos - aside * sin,
+                    place.y + nearest * sin + aside * cos,
+                );
+            }
+        }
+        let (x, y) = (place.x + nearest * cos, place.y + nearest * sin);
+        if let Some(door) = self.map.door_near(x, y, DOOR_M) {
+            self.map.set_door(door, true);
+            self.review = true;
+            // The line between the posts is marked too: it survives a restart, the door's state does not.
+            if let Some(door) = self.map.doors().get(door).cloned() {
+                for i in 0..=8 {
+                    let t = i as f32 / 8.0;
+                    self.map.mark_unmapped(
+                        door.a.0 + t * (door.b.0 - door.a.0),
+                        door.a.1 + t * (door.b.1 - door.a.1),
+                    );
+                }
+            }
+        }
+        self.count_try();
+    }
+
+    fn count_try(&mut self) {
+        let Some(stop) = self.stops.get(self.target).filter(|stop| stop.look) else {
+            return;
+        };
+        if (self.tried.0 - stop.x).hypot(self.tried.1 - stop.y) < SAME_STOP_M {
+            self.tries += 1;
+        } else {
+            (self.tried, self.tries) = ((stop.x, stop.y), 1);
+        }
+        if self.tries >= self.max_tries && self.given_up.len() < MAX_GIVEN_UP {
+            self.given_up.push((stop.x, stop.y));
+            self.tries = 0;
+        }
+    }
+
+    /// Corner that is flown to.
+    #[must_use]
+    pub(crate) fn next_corner(&self) -> usize {
+        self.track.next().min(self.corners.len())
+    }
+
+    /// Whether a stop of the round still lies in this room.
+    #[must_use]
+    pub(crate) fn has_stop_in(&self, room: usize) -> bool {
+        self.stops.iter().skip(self.target).any(|stop| stop.look && stop.room == Some(room))
+    }
+
+    /// Whether a place in this room was given up.
+    #[must_use]
+    pub(crate) fn gave_up_in(&self, room: usize) -> bool {
+        self.given_up.iter().any(|(x, y)| {
+            self.map.raster().cell(*x, *y).and_then(|cell| self.map.room_of(cell)) == Some(room)
+        })
+    }
+}

@@ -1,0 +1,143 @@
+//! [`Core`] with the ports of the runtime.
+
+use crate::atlas::Atlas;
+use crate::config::NavigationConfig;
+use crate::core::Core;
+use crate::steer::Craft;
+use ::core::fmt::Write;
+use floorplan::{Rooms, Sidecar};
+use ipc_types::{Command, Grid, Patrol, PilotState, Polar, Pose, Setpoint, SonarRanges, Text};
+use runtime::{ConfigError, Guard, Input, Output, Ports, Service, Start, StartError};
+
+/// The retained state of the round is said this often, nanoseconds: twice a second.
+const PATROL_NS: u64 = 500_000_000;
+
+/// The service.
+pub struct Navigation {
+    core: Core,
+    pose: Input<Pose>,
+    ranges: Input<SonarRanges>,
+    pilot: Input<PilotState>,
+    command: Input<Command>,
+    last_grid: Input<Grid>,
+    grid: Output<Grid>,
+    polar: Output<Polar>,
+    setpoint: Output<Setpoint>,
+    patrol: Output<Patrol>,
+    /// The newest grid: the working memory of the next step.
+    known: Option<Guard<Grid>>,
+    retained: Option<Box<Patrol>>,
+    said_ns: Option<u64>,
+    said_state: u8,
+    resumed: bool,
+}
+
+/// The plan's side file: `demo.yaml` has `demo.rooms.yaml`; nothing is named without one.
+fn sidecar(start: &Start) -> Result<Sidecar, StartError> {
+    let plan = &start.system.plan;
+    let name = format!("{}.rooms.yaml", plan.strip_suffix(".yaml").unwrap_or(plan));
+    if !start.exists(&name) {
+        return Ok(Sidecar::default());
+    }
+    Sidecar::parse(&name, &start.read(&name)?).map_err(StartError::invalid)
+}
+
+impl Service for Navigation {
+    const NAME: &'static str = "navigation";
+    type Config = NavigationConfig;
+
+    fn start(config: NavigationConfig, ports: &mut Ports, start: &Start) -> Result<Self, StartError> {
+        let vehicle = &start.vehicle;
+        let cruise = if config.cruise_m_s > 0.0 { config.cruise_m_s } else { vehicle.limits.cruise_m_s };
+        let craft = Craft { radius_m: vehicle.body.radius_m, cruise_m_s: cruise };
+        let plan = start.plan()?;
+        // The radius is in the key: vehicles of one rehearsal may differ.
+        let key = format!("navigation atlas {} {}", start.system.plan, craft.radius_m);
+        let atlas = start.shared(&key, || {
+            let sidecar = sidecar(start)?;
+            let rooms = Rooms::of(&start.system.plan, &sidecar, &plan).map_err(StartError::invalid)?;
+            Ok(Atlas::new(plan.clone(), rooms, &sidecar, craft.radius_m))
+        })?;
+        let core = Core::new(config, craft, atlas).map_err(|error| {
+            ConfigError::range("radius_m", error, "a radius that avoidance can work with")
+        })?;
+        Ok(Self {
+            core,
+            pose: ports.input(8)?,
+            ranges: ports.input(8)?,
+            pilot: ports.input(4)?,
+            command: ports.input(8)?,
+            last_grid: ports.input(1)?,
+            grid: ports.output()?,
+            polar: ports.output()?,
+            setpoint: ports.output()?,
+            patrol: ports.output()?,
+            known: None,
+            retained: ports.retained()?,
+            said_ns: None,
+            said_state: u8::MAX,
+            resumed: false,
+        })
+    }
+
+    fn step(&mut self, now: u64) {
+        let core = &mut self.core;
+        if !self.resumed {
+            self.resumed = true;
+            if let Some(patrol) = self.retained.take() {
+                core.resume(&patrol);
+            }
+        }
+        while let Some(message) = self.pose.receive() {
+            core.pose(&message);
+        }
+        while let Some(message) = self.ranges.receive() {
+            core.ranges(&message);
+        }
+        while let Some(message) = self.pilot.receive() {
+            core.pilot(&message);
+        }
+        while let Some(message) = self.command.receive() {
+            core.command(&message);
+        }
+        if let Some(grid) = self.last_grid.latest() {
+            self.known = Some(grid);
+        }
+
+        let mut grid = self.grid.loan();
+        let mapped = grid.as_mut().is_some_and(|next| core.map(now, self.known.as_deref(), next));
+        let grid = grid.filter(|_| mapped);
+        // Without a place in shared memory for it the decision is still made, unseen.
+        let mut unseen = Polar::default();
+        let mut polar = self.polar.loan();
+        let setpoint = core.decide(now, grid.as_deref(), polar.as_deref_mut().unwrap_or(&mut unseen));
+        self.setpoint.publish(&setpoint);
+        if let Some(grid) = grid {
+            grid.send();
+        }
+        if let Some(polar) = polar {
+            polar.send();
+        }
+        let state = core.mission().state().code();
+        let due = self.said_ns.is_none_or(|said| now.saturating_sub(said) >= PATROL_NS);
+        if (due || state != self.said_state)
+            && let Some(mut patrol) = self.patrol.loan()
+        {
+            core.write_patrol(&mut patrol);
+            patrol.send();
+            self.said_ns = Some(now);
+            self.said_state = state;
+        }
+        // Last, so that planning never delays a setpoint.
+        core.plan_on(now);
+    }
+
+    fn status(&self, text: &mut Text<96>) {
+        // What does not fit is cut.
+        let _ = write!(text, "{}: {}", self.core.mission().state(), self.core.text());
+    }
+
+    fn refused(&self) -> u64 {
+        self.core.refused()
+    }
+}

@@ -1,0 +1,130 @@
+//! What the pilot hears.
+
+use crate::core::PilotCore;
+use crate::senses::SetpointSeen;
+use control::{Echo, Look, Tilt, Vector};
+use ipc_types::{
+    Attitude, FlightState, Patrol, PatrolState, Phase, Pose, Power, Setpoint, SonarHealth, SonarRanges,
+    SonarStatus,
+};
+
+/// Speed of sound at 20 C, m/s, to place an echo in time.
+const SOUND_M_S: f32 = 343.0;
+
+impl PilotCore {
+    /// Takes an attitude.
+    pub fn attitude(&mut self, message: &Attitude) {
+        if !self.attitude.take(message) {
+            self.refused += 1;
+            return;
+        }
+        if self.phase == Phase::Grounded && !self.flight.armed {
+            // On the ground gravity is all that the controller's accelerometer feels: about a second's mean.
+            let share = if self.ground.seen == 0 { 1.0 } else { 0.03 };
+            self.ground.seen = self.ground.seen.saturating_add(1);
+            let (old, new) = (self.ground.tilt, self.attitude.tilt);
+            self.ground.tilt = Tilt {
+                roll: old.roll + share * (new.roll - old.roll),
+                pitch: old.pitch + share * (new.pitch - old.pitch),
+            };
+        }
+    }
+
+    /// Takes a pose.
+    pub fn pose(&mut self, message: &Pose) {
+        match self.pose.take(message) {
+            Some((at, place, velocity)) => self.motion.correct(at, place, velocity),
+            None => self.refused += 1,
+        }
+    }
+
+    /// Takes what the controller and its link are doing.
+    pub fn flight_state(&mut self, message: &FlightState) {
+        if !self.flight.take_state(message) {
+            self.refused += 1;
+        }
+    }
+
+    /// Takes the battery.
+    pub fn power(&mut self, message: &Power) {
+        self.flight.take_power(message, self.craft.cells);
+    }
+
+    /// Takes a setpoint of navigation.
+    pub fn setpoint(&mut self, message: &Setpoint) {
+        match SetpointSeen::read(message) {
+            Some(setpoint) => self.setpoint = Some(setpoint),
+            None => self.refused += 1,
+        }
+    }
+
+    /// Takes the pad from navigation's round, to know the way home.
+    pub fn patrol(&mut self, message: &Patrol) {
+        let known = u8::try_from(message.state).ok().and_then(PatrolState::from_code);
+        let pad = Vector::new(message.pad_x_m, message.pad_y_m);
+        let flies =
+            !matches!(known, None | Some(PatrolState::Idle | PatrolState::Done | PatrolState::Failed));
+        if self.resumed && self.phase == Phase::TakeOff && flies {
+            // What the interrupted take-off was for: navigation remembers its round.
+            self.after_take_off = Phase::Autonomous;
+        }
+        if known.is_some_and(|state| state != PatrolState::Idle) && pad.is_finite() {
+            self.set_home(pad);
+        }
+    }
+
+    pub(crate) fn set_home(&mut self, home: Vector) {
+        if let Some(way) = &mut self.way_home
+            && way.home().is_none_or(|known| (known - home).norm() > 0.3)
+        {
+            way.set_home(home);
+        }
+    }
+
+    /// Takes a ping group.
+    pub fn ranges(&mut self, message: &SonarRanges) {
+        if message.count as usize > ipc_types::MAX_SONARS {
+            self.refused += 1;
+            return;
+        }
+        self.shield.set_sweep(message.sweep_s);
+        for reading in message.filled() {
+            let (Some(status), Some(health)) =
+                (SonarStatus::from_code(reading.status), SonarHealth::from_code(reading.health))
+            else {
+                self.refused += 1;
+                continue;
+            };
+            let good = health == SonarHealth::Good && status != SonarStatus::Fault;
+            if reading.looks_down() {
+                self.down.ping_ns = Some(reading.ping_ns);
+                self.down.good = good;
+                self.down.range_m = reading.range().filter(|_| good);
+                if let Some(range) = self.down.range_m {
+                    self.hear_ground(reading.ping_ns, range);
+                }
+            } else if good {
+                let echo = match status {
+                    SonarStatus::Ok => Echo::Range(reading.range_m),
+                    _ => Echo::Nothing,
+                };
+                let look = Look { at_ns: reading.ping_ns, heading: self.heading(), echo };
+                if !self.shield.hear(usize::from(reading.sensor), look) {
+                    self.refused += 1;
+                }
+            }
+        }
+    }
+
+    fn hear_ground(&mut self, ping_ns: u64, range_m: f32) {
+        let at = ping_ns + (range_m / SOUND_M_S * 1e9) as u64;
+        if let Some(spool) = &mut self.spool {
+            spool.hear(at, range_m - self.height.rest_m());
+        } else if self.airborne() {
+            let tilt = self.tilt().magnitude();
+            self.height.measure(at, range_m, tilt);
+        } else if self.phase == Phase::Grounded {
+            self.down.stand(range_m);
+        }
+    }
+}

@@ -1,0 +1,316 @@
+//! A small aircraft around the pilot's core: tilt and thrust with lags behind a delayed link, a level error, a
+//! compass that does not know the plan, sonars in opposite pairs with the down sonar each time, late poses.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
+
+use control::{Tilt, Vector, stick};
+use floorplan::{DistanceField, Plan};
+use ipc_types::{
+    Channels, Command, LinkState, LocalizationState, Phase, PilotState, Pose, Setpoint, SetpointKind,
+    SonarHealth, SonarRanges, Verb,
+};
+use pilot::{Craft, PilotConfig, PilotCore};
+use std::collections::VecDeque;
+use std::f32::consts::FRAC_PI_4;
+use std::sync::Arc;
+
+pub(crate) const MS: u64 = 1_000_000;
+const RADIUS: f32 = 0.225;
+pub(crate) const MOUNT: f32 = 0.2;
+pub(crate) const REST: f32 = 0.03;
+/// Plan heading minus compass yaw.
+pub(crate) const COMPASS: f32 = -0.6;
+
+pub(crate) struct Noise(pub(crate) u64);
+impl Noise {
+    pub(crate) fn unit(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f32 / (1u64 << 24) as f32
+    }
+    pub(crate) fn normal(&mut self) -> f32 {
+        (0..12).map(|_| self.unit()).sum::<f32>() - 6.0
+    }
+}
+
+/// 8 m x 6 m, 0.1 m a character.
+pub(crate) fn room() -> Plan {
+    let rows: Vec<String> = (0..60)
+        .map(|row| {
+            (0..80)
+                .map(|column| if row == 0 || row == 59 || column == 0 || column == 79 { '#' } else { '.' })
+                .collect()
+        })
+        .collect();
+    Plan::from_ascii(&rows.iter().map(String::as_str).collect::<Vec<_>>(), 0.1)
+}
+
+pub(crate) fn craft() -> Craft {
+    Craft {
+        radius_m: RADIUS,
+        sides: (0..8)
+            .map(|k| (k, k as f32 * FRAC_PI_4, Vector::along(k as f32 * FRAC_PI_4) * MOUNT))
+            .collect(),
+        has_down: true,
+        rest_m: REST,
+        hover_us: 1480.0,
+        cells: 4,
+        capacity_mah: 3300.0,
+        cruise_m_s: 0.5,
+        max_tilt_rad: 10f32.to_radians(),
+    }
+}
+
+pub(crate) struct Rig {
+    pub(crate) plan: Plan,
+    pub(crate) walls: Arc<DistanceField>,
+    pub(crate) core: PilotCore,
+    pub(crate) now: u64,
+    pub(crate) noise: Noise,
+    pub(crate) place: Vector,
+    pub(crate) velocity: Vector,
+    pub(crate) height: f32,
+    pub(crate) climb: f32,
+    pub(crate) heading: f32,
+    pub(crate) tilt: Tilt,
+    rate: Tilt,
+    load: f32,
+    link: VecDeque<[f32; 4]>,
+    pub(crate) poses: VecDeque<Pose>,
+    pub(crate) echoes: VecDeque<(u64, SonarRanges)>,
+    pub(crate) armed: bool,
+    arm_wanted_ms: u64,
+    pub(crate) hover_us: f32,
+    pub(crate) level: Tilt,
+    pub(crate) gust_rms: f32,
+    gust: Vector,
+    pub(crate) surface: f32,
+    pub(crate) down_lost: f32,
+    pub(crate) down_health: SonarHealth,
+    pub(crate) sides_dead: bool,
+    pub(crate) localization_dead: bool,
+    pub(crate) level_known: bool,
+    pub(crate) pose_state: LocalizationState,
+    pub(crate) link_state: LinkState,
+    pub(crate) blocks: u32,
+    pub(crate) cell_volts: f32,
+    pub(crate) will_arm: bool,
+    pub(crate) channels: Channels,
+    pub(crate) state: PilotState,
+    pub(crate) touched_at: f32,
+    pub(crate) touch_tilt: f32,
+    pub(crate) setpoint: Option<Setpoint>,
+    pub(crate) least_clearance: f32,
+    pub(crate) steps: u64,
+    sequence: u32,
+}
+
+impl Rig {
+    pub(crate) fn new(seed: u64) -> Self {
+        let plan = room();
+        let walls = Arc::new(DistanceField::new(&plan, 2.0));
+        let core = PilotCore::new(PilotConfig::default(), craft(), Some((&plan, Arc::clone(&walls))));
+        let (x, y) = plan.origin();
+        Self {
+            plan,
+            walls,
+            core,
+            now: 5_000 * MS,
+            noise: Noise(seed),
+            place: Vector::new(x + 3.0, y + 3.0),
+            velocity: Vector::ZERO,
+            height: 0.0,
+            climb: 0.0,
+            heading: 0.4,
+            tilt: Tilt::default(),
+            rate: Tilt::default(),
+            load: 0.0,
+            link: VecDeque::from(vec![[0.0, 0.0, 1000.0, 0.0]; 30]),
+            poses: VecDeque::new(),
+            echoes: VecDeque::new(),
+            armed: false,
+            arm_wanted_ms: 0,
+            hover_us: 1500.0,
+            level: Tilt::default(),
+            gust_rms: 0.0,
+            gust: Vector::ZERO,
+            surface: 0.0,
+            down_lost: 0.03,
+            down_health: SonarHealth::Good,
+            sides_dead: false,
+            localization_dead: false,
+            level_known: false,
+            pose_state: LocalizationState::Tracking,
+            link_state: LinkState::Up,
+            blocks: 0,
+            cell_volts: 4.0,
+            will_arm: true,
+            channels: Channels::default(),
+            state: PilotState::default(),
+            touched_at: 0.0,
+            touch_tilt: 0.0,
+            setpoint: None,
+            least_clearance: f32::INFINITY,
+            steps: 0,
+            sequence: 0,
+        }
+    }
+
+    pub(crate) fn phase(&self) -> Phase {
+        self.core.phase()
+    }
+
+    pub(crate) fn order(&mut self, verb: Verb) {
+        self.sequence += 1;
+        let command =
+            Command { verb: verb.code().into(), command_sequence: self.sequence, ..Default::default() };
+        self.core.command(self.now, &command);
+    }
+
+    /// What navigation says from now on; the expiry is renewed 20 times a second.
+    pub(crate) fn navigate(&mut self, kind: SetpointKind, velocity: Vector, hold: Vector) {
+        self.setpoint = Some(Setpoint {
+            kind: kind.code().into(),
+            velocity_x_m_s: velocity.x,
+            velocity_y_m_s: velocity.y,
+            heading_rad: f32::NAN,
+            height_m: 1.2,
+            hold_x_m: hold.x,
+            hold_y_m: hold.y,
+            ..Default::default()
+        });
+    }
+
+    /// 20 ms: sense, think, fly.
+    pub(crate) fn step(&mut self) {
+        self.sense();
+        self.core.step(self.now);
+        if self.core.fills_channels() {
+            self.core.write_channels(self.now, &mut self.channels);
+        }
+        self.core.write_state(&mut self.state);
+        self.check();
+        self.fly();
+    }
+
+    fn check(&self) {
+        let c = &self.channels;
+        assert!(c.count == 6 || c.count == 0);
+        assert!(c.channels_us[..c.count as usize].iter().all(|us| (1000..=2000).contains(us)));
+        for k in [0, 1] {
+            // Never more than the tilt limit and the trim.
+            let angle = stick::angle_of(f32::from(c.channels_us[k].max(1000))).to_degrees();
+            assert!(c.count == 0 || angle.abs() < 15.1, "{angle}");
+        }
+        assert!(self.height < 1.75, "flew away: {}", self.height);
+    }
+
+    fn fly(&mut self) {
+        let c = &self.channels;
+        let armed_wish = c.count > 0 && c.arm == 1;
+        self.arm_wanted_ms = if armed_wish { self.arm_wanted_ms + 20 } else { 0 };
+        if self.will_arm && self.arm_wanted_ms > 400 && c.channels_us[2] <= 1050 {
+            self.armed = true;
+        }
+        if !armed_wish {
+            self.armed = false;
+        }
+        for _ in 0..20 {
+            self.fly_ms();
+        }
+        let push = Vector::new(self.noise.normal(), self.noise.normal());
+        self.gust += self.gust * -0.02 + push * (self.gust_rms * 0.2);
+        self.now += 20 * MS;
+        self.steps += 1;
+        if self.height > 0.2 {
+            self.least_clearance =
+                self.least_clearance.min(self.walls.distance(self.place.x, self.place.y) - RADIUS);
+        }
+    }
+
+    fn fly_ms(&mut self) {
+        let us = self.channels.channels_us;
+        let u = |k: usize| f32::from(us[k].max(1000));
+        self.link.push_back([
+            stick::angle_of(u(0)) - self.level.roll,
+            stick::angle_of(u(1)) - self.level.pitch,
+            if self.armed { u(2) } else { 1000.0 },
+            stick::yaw_rate_of(u(3)),
+        ]);
+        let [roll, pitch, throttle, turn] = self.link.pop_front().unwrap();
+        let wanted = ((throttle - 1000.0) / (self.hover_us - 1000.0)).powi(2);
+        self.load += (wanted - self.load) * 0.001 / 0.05;
+        let grounded = self.height <= self.surface + 1e-4;
+        let (w, z) = (12.0, 0.75);
+        if grounded && self.load < 1.0 {
+            (self.tilt, self.rate) = (Tilt::default(), Tilt::default());
+            self.velocity = Vector::ZERO;
+        } else {
+            self.rate.roll += (w * w * (roll - self.tilt.roll) - 2.0 * z * w * self.rate.roll) * 0.001;
+            self.rate.pitch += (w * w * (pitch - self.tilt.pitch) - 2.0 * z * w * self.rate.pitch) * 0.001;
+            self.tilt.roll += self.rate.roll * 0.001;
+            self.tilt.pitch += self.rate.pitch * 0.001;
+            self.heading = control::wrap_angle(self.heading + turn * 0.001);
+            let a = self.tilt.acceleration(self.heading) * self.load + self.gust - self.velocity * 0.3;
+            self.velocity += a * 0.001;
+            self.place += self.velocity * 0.001;
+        }
+        let lift = 9.81 * (self.load * self.tilt.magnitude().cos() - 1.0);
+        self.climb += (lift - 0.1 * self.climb) * 0.001;
+        self.height += self.climb * 0.001;
+        if self.height <= self.surface {
+            if self.climb < -0.05 {
+                self.touched_at = self.touched_at.min(self.climb);
+                self.touch_tilt = self.touch_tilt.max(self.tilt.magnitude());
+            }
+            self.height = self.surface;
+            self.climb = self.climb.max(0.0);
+        }
+    }
+
+    pub(crate) fn run(&mut self, seconds: f32) {
+        for _ in 0..(seconds * 50.0) as usize {
+            self.step();
+        }
+    }
+
+    /// Sits a second, takes off and reaches a hover.
+    pub(crate) fn take_off(&mut self) {
+        self.run(1.5);
+        self.order(Verb::TakeOff);
+        assert_eq!(self.phase(), Phase::Arming, "{}", self.core.sentence());
+        for _ in 0..750 {
+            self.step();
+            if self.phase() == Phase::Hover {
+                self.touched_at = 0.0;
+                return;
+            }
+        }
+        panic!("no hover: {} {}", self.phase(), self.core.sentence());
+    }
+
+    /// Flies on until the motors are off.
+    pub(crate) fn until_grounded(&mut self, seconds: f32) -> f32 {
+        for step in 0..(seconds * 50.0) as usize {
+            self.step();
+            if self.phase() == Phase::Grounded {
+                let cut_height = self.height - self.surface;
+                self.run(0.6);
+                assert!(!self.armed);
+                // What is left to fall counts as well.
+                assert!(cut_height < 0.02, "cut {cut_height} m up");
+                return step as f32 * 0.02;
+            }
+        }
+        panic!("not down after {seconds} s: {} at {} m", self.phase(), self.height);
+    }
+
+    /// A new core that knows only what the dead one published, `gap` later; its last channels are flown on.
+    pub(crate) fn restart(&mut self, gap_ms: u64) {
+        let retained = self.state;
+        for _ in 0..gap_ms / 20 {
+            self.fly();
+        }
+        self.core =
+            PilotCore::new(PilotConfig::default(), craft(), Some((&self.plan, Arc::clone(&self.walls))));
+        self.core.resume(self.now, &retained);
+    }
+}
