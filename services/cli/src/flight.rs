@@ -7,7 +7,7 @@ use airframe::world::World;
 use anyhow::Result;
 use ipc_types::Verb;
 use manifest::{Body, Manifest};
-use navigation::NavigationConfig;
+use navigation::config::NavigationConfig;
 use runtime::{Cache, Lockstep, Start};
 use std::path::Path;
 

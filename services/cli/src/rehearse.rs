@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use cli::flight::{Flight, Setup};
 use cli::place::{Place, vehicle_file};
 use indicatif::{ProgressBar, ProgressStyle};
-use navigation::NavigationConfig;
+use navigation::config::NavigationConfig;
 use runtime::Cache;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

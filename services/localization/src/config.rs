@@ -209,7 +209,7 @@ impl Validate for LocalizationConfig {
         within("max_age_s", self.max_age_s, 0.5..=30.0)?;
         let start = &self.start;
         let given = [start.x_m, start.y_m, start.heading_deg].iter().flatten().count();
-        if given % 3 != 0 {
+        if given != 0 && given != 3 {
             return Err(ConfigError::range(
                 "start",
                 format!("{given} of x_m, y_m and heading_deg"),

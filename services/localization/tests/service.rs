@@ -153,14 +153,14 @@ impl Bench {
     fn sense(&mut self, now: u64) {
         let t = self.truth(now);
         let ms = now / MS;
-        if ms % 33 == 0 {
+        if ms.is_multiple_of(33) {
             let mut m = Attitude { sampled_ns: now - 8 * MS, ..Attitude::default() };
             let then = self.truth(m.sampled_ns);
             (m.roll_rad, m.pitch_rad) = (then.roll + 0.01, then.pitch - 0.012);
             m.yaw_rad = mcl::wrap_angle(then.heading - OFFSET);
             self.attitude.publish(&m);
         }
-        if ms % 40 == 0 {
+        if ms.is_multiple_of(40) {
             let (sin, cos) = t.heading.sin_cos();
             let m = FlowMotion {
                 sampled_ns: now - 10 * MS,
@@ -171,13 +171,13 @@ impl Bench {
             };
             self.flow.publish(&m);
         }
-        if ms % 200 == 0 {
+        if ms.is_multiple_of(200) {
             self.pilot.publish(&PilotState {
                 on_ground: u8::from(now <= self.took_off_ns),
                 ..PilotState::default()
             });
         }
-        if ms % 60 == 0 {
+        if ms.is_multiple_of(60) {
             let ping_ns = now - 30 * MS;
             let then = self.truth(ping_ns);
             let mut m = SonarRanges { count: 2, sensors: 8, sweep_s: 0.24, ..SonarRanges::default() };
@@ -300,7 +300,7 @@ fn silent_sonars_leave_it_guessing_and_saying_so() {
     for _ in 0..3_000 {
         let next = (bench.system.now() / MS + 1) * MS;
         bench.system.run_until(next);
-        if next / MS % 60 != 0 && next / MS % 40 != 0 {
+        if ![40, 60].iter().any(|period| (next / MS).is_multiple_of(*period)) {
             bench.sense(next);
         }
         while let Some(pose) = bench.poses.receive() {

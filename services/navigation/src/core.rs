@@ -8,13 +8,13 @@ use crate::mission::{Event, Goal, Intent, Mission, Nonsense};
 use crate::place::Place;
 use crate::senses::Senses;
 use crate::steer::{Craft, Scene, Steer, Steering};
+use crate::words::{blank_setpoint, write_polar};
 use avoid::grid::{insert, scroll};
 use avoid::{CELL_M, CELLS, GridRules, Histogram, SIDE, WallLayer, Window};
-use core::fmt::Write;
 use floorplan::Cell;
 use ipc_types::{
-    Command, Grid, Patrol, PatrolState, PilotState, Polar, Pose, Setpoint, SetpointKind, SonarRanges,
-    SteeringReason, Text, nanoseconds, seconds_between,
+    Command, Grid, Patrol, PilotState, Polar, Pose, Setpoint, SetpointKind, SonarRanges, SteeringReason,
+    Text, seconds_between,
 };
 use std::sync::Arc;
 
@@ -40,12 +40,12 @@ pub struct Core {
     rules: GridRules,
     walls: WallLayer,
     steering: Steering,
-    blockage: Blockage,
-    mission: Mission,
-    journey: Journey,
+    pub(crate) blockage: Blockage,
+    pub(crate) mission: Mission,
+    pub(crate) journey: Journey,
     stand: Option<(f32, f32)>,
     last_ns: Option<u64>,
-    text: Text<128>,
+    pub(crate) text: Text<128>,
     started_ns: u64,
     refused: u64,
 }
@@ -225,7 +225,7 @@ impl Core {
             (Some(place), Some(grid), Some(window)) => {
                 let setpoint = self.setpoint(now, &place, intent);
                 let follow = intent == Intent::Follow && hearing && place.tracking;
-                let steer = self.steer(now, dt_s, &place, grid, window, follow, polar);
+                let steer = self.steer(now, dt_s, &place, (grid, window), follow, polar);
                 let setpoint = if follow {
                     self.follow(dt_s, &place, grid, window, &steer, setpoint)
                 } else {
@@ -262,8 +262,7 @@ impl Core {
         now: u64,
         dt_s: f32,
         place: &Place,
-        grid: &Grid,
-        window: Window,
+        (grid, window): (&Grid, Window),
         follow: bool,
         polar: &mut Polar,
     ) -> Steer {
@@ -371,43 +370,6 @@ impl Core {
         setpoint
     }
 
-    /// Says in one sentence what is being done and why.
-    fn say(&mut self, intent: Intent, seeing: bool) {
-        let mut text = Text::<128>::default();
-        let state = self.mission.state();
-        let journey = &self.journey;
-        // What does not fit is cut at the end, where it matters least.
-        let _ = match (state, intent) {
-            (PatrolState::Idle, _) => write!(text, "waiting for a command"),
-            (PatrolState::Done, _) => write!(text, "the round is flown and the drone has landed"),
-            (PatrolState::Failed, _) => write!(text, "gave up: {}", journey.trouble()),
-            (PatrolState::Paused, _) => write!(text, "paused: waiting for the operator"),
-            (PatrolState::Landing, Intent::Land(_)) => write!(text, "landing on the pad"),
-            (PatrolState::Landing, _) => write!(text, "coming to rest over the pad"),
-            (_, Intent::Follow) if !seeing => write!(text, "standing: no fresh pose or ranges"),
-            (_, Intent::Follow) => {
-                let _ = match self.mission.goal() {
-                    Goal::There((x, y)) => write!(text, "flying to {x:.1}, {y:.1}"),
-                    Goal::Home => write!(text, "flying home"),
-                    _ => journey.write_errand(&mut text),
-                };
-                self.write_steering(&mut text)
-            }
-            _ if !journey.planned() => write!(text, "working out the route"),
-            _ if !self.mission.airborne() => write!(text, "ready: waiting for the take-off"),
-            _ => write!(text, "standing: the pilot is flying on its own"),
-        };
-        self.text = text;
-    }
-
-    fn write_steering(&self, text: &mut Text<128>) -> core::fmt::Result {
-        if self.blockage.waiting() {
-            write!(text, ": something stands in the way, waiting for it to move on")
-        } else {
-            Ok(())
-        }
-    }
-
     /// Fills the retained message.
     pub fn write_patrol(&mut self, patrol: &mut Patrol) {
         self.journey.write(patrol);
@@ -417,41 +379,6 @@ impl Core {
         patrol.command_sequence = self.mission.command();
         patrol.text = self.text;
     }
-}
-
-/// Standing where it is, at the height of the round.
-fn blank_setpoint(now: u64, config: &NavigationConfig) -> Setpoint {
-    Setpoint {
-        expiry_ns: now.saturating_add(nanoseconds(f64::from(config.expiry_s))),
-        heading_rad: f32::NAN,
-        height_m: config.height_m,
-        hold_x_m: f32::NAN,
-        hold_y_m: f32::NAN,
-        kind: u32::from(SetpointKind::Hover.code()),
-        ..Setpoint::default()
-    }
-}
-
-/// Fills what the histogram did not; without a decision everything.
-fn write_polar(polar: &mut Polar, steer: Option<(&Steer, bool)>) {
-    polar.reserved = 0;
-    let Some((steer, seeing)) = steer else {
-        polar.raw.fill(0.0);
-        polar.smoothed.fill(0.0);
-        polar.blocked.fill(0);
-        (polar.threshold_high, polar.threshold_low) = (f32::NAN, f32::NAN);
-        (polar.target_rad, polar.chosen_rad, polar.speed_m_s) = (f32::NAN, f32::NAN, 0.0);
-        (polar.valley_first, polar.valley_last) = (255, 255);
-        polar.reason = SteeringReason::Blind.code();
-        return;
-    };
-    polar.threshold_high = steer.decision.threshold_high;
-    polar.threshold_low = steer.decision.threshold_low;
-    polar.target_rad = steer.target;
-    polar.chosen_rad = steer.direction;
-    polar.speed_m_s = steer.velocity.0.hypot(steer.velocity.1);
-    (polar.valley_first, polar.valley_last) = steer.decision.valley.unwrap_or((255, 255));
-    polar.reason = if seeing { steer.reason } else { SteeringReason::Blind }.code();
 }
 
 // The grid message holds exactly the window that the algorithms work on.

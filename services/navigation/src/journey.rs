@@ -3,10 +3,7 @@
 use crate::atlas::Atlas;
 use crate::mission::Goal;
 use crate::place::Place;
-use crate::steer::STANDS_CERTAINTY;
 use crate::track::{MAX_CORNERS, SHORTEST_M, Track};
-use avoid::Window;
-use avoid::swath::for_each_certain;
 use core::fmt::{self, Write};
 use ipc_types::{MAX_WAYPOINTS, RoomProgress, Text};
 use patrol::{Bits, Costmap, Obstacle, Progress, RoomPlan, Round, RoutePlanner, Seen, Step, Stop, Tally};
@@ -15,34 +12,23 @@ use std::sync::Arc;
 /// One slice of working out a round: about 2 ms here, 5 ms on a Pi 4, of the 50 ms between decisions.
 const ROUND_UNITS: usize = 600_000;
 /// One slice of a route, in cells of 0.1 us.
-const ROUTE_NODES: usize = 15_000;
+pub(crate) const ROUTE_NODES: usize = 15_000;
 /// Distance flown between two looks, metres: the view reaches 20 times as far.
 const LOOK_EVERY_M: f32 = 0.15;
 /// Looks remembered: more than a kilometre.
 const MAX_LOOKS: usize = 8192;
 /// Looks worked out again in a slice: about 30 us each.
 const LOOKS_A_SLICE: usize = 60;
-/// Things are taken for standing in the way this far ahead and this far to the side, metres.
-const AHEAD_M: f32 = 1.3;
-const BESIDE_M: f32 = 0.45;
-/// A blockage nearer than this to a door's line is the door, metres: a leaf is ajar by a little.
-const DOOR_M: f32 = 0.35;
-/// Half of the stretch stamped when nothing was seen and still there was no progress, metres.
-const UNSEEN_HALF_M: f32 = 0.15;
 /// Stops nearer together than this are the same place, metres.
-const SAME_STOP_M: f32 = 0.6;
+pub(crate) const SAME_STOP_M: f32 = 0.6;
 /// Places that are given up for one round at most.
-const MAX_GIVEN_UP: usize = 64;
+pub(crate) const MAX_GIVEN_UP: usize = 64;
 /// Planning that failed is tried again with a clean slate this often.
 const FRESH_STARTS: u32 = 4;
 /// Marks nearer to the drone than this are forgotten when it is walled in by them, metres.
 const FORGET_M: f32 = 1.0;
 /// Work slices between two looks whether the next stops are still worth the way: once a second.
-const TRIM_EVERY: u32 = 20;
-/// Stops asked in one go whether they are still worth the way.
-const TRIM_AHEAD: usize = 4;
-/// A stop this near is flown to in any case, metres.
-const TRIM_NEAR_M: f32 = 0.6;
+pub(crate) const TRIM_EVERY: u32 = 20;
 
 /// What a slice of work came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,7 +54,7 @@ pub(crate) struct Corner {
 }
 
 #[derive(Debug)]
-enum Stage {
+pub(crate) enum Stage {
     Idle,
     /// What was seen is worked out again on a map that has changed: looks done so far.
     Review(usize),
@@ -94,27 +80,27 @@ pub struct Journey {
     /// Why each room is left out; empty where it is not.
     pub(crate) reasons: Vec<Text<64>>,
     pub(crate) tallies: Vec<Tally>,
-    planner: RoutePlanner,
-    stage: Stage,
-    stops: Vec<Stop>,
+    pub(crate) planner: RoutePlanner,
+    pub(crate) stage: Stage,
+    pub(crate) stops: Vec<Stop>,
     /// Stop that is flown to.
-    target: usize,
+    pub(crate) target: usize,
     pub(crate) corners: Vec<Corner>,
-    track: Track,
+    pub(crate) track: Track,
     /// Where the drone looked about since start, and what had been seen before.
     looks: Vec<(f32, f32)>,
     seen_before: Bits,
     /// A door was taken for open that is shut: what was seen through it was not.
-    review: bool,
+    pub(crate) review: bool,
     /// Coverage and rooms as a restart found them, until a round is planned.
     pub(crate) kept: Option<(f32, Vec<RoomProgress>)>,
-    max_tries: u32,
-    tried: (f32, f32),
-    tries: u32,
-    given_up: Vec<(f32, f32)>,
+    pub(crate) max_tries: u32,
+    pub(crate) tried: (f32, f32),
+    pub(crate) tries: u32,
+    pub(crate) given_up: Vec<(f32, f32)>,
     fresh_starts: u32,
-    since_trim: u32,
-    round: bool,
+    pub(crate) since_trim: u32,
+    pub(crate) round: bool,
     trouble: Text<64>,
 }
 
@@ -438,7 +424,7 @@ impl Journey {
     }
 
     /// Adds a point to corners and track; one that repeats the last only names its stop.
-    fn push_corner(&mut self, (x, y): (f32, f32), stop: Option<usize>) {
+    pub(crate) fn push_corner(&mut self, (x, y): (f32, f32), stop: Option<usize>) {
         if let Some(last) = self.corners.last_mut()
             && (last.x - x).hypot(last.y - y) < 2.0 * SHORTEST_M
         {
@@ -451,7 +437,7 @@ impl Journey {
         }
     }
 
-    fn append_leg(&mut self, stop: usize) {
+    pub(crate) fn append_leg(&mut self, stop: usize) {
         let count = self.planner.route().points.len();
         for i in 0..count {
             let point = self.planner.route().points[i];
@@ -464,124 +450,6 @@ impl Journey {
         let passed = self.track.next().saturating_sub(1).min(self.corners.len());
         self.corners.drain(..passed);
         self.track.forget(passed);
-    }
-
-    /// Looks whether the next stops have been seen from the way there.
-    fn consider_trim(&mut self, place: &Place) {
-        self.since_trim += 1;
-        if self.since_trim < TRIM_EVERY || !self.round {
-            return;
-        }
-        self.since_trim = 0;
-        let near =
-            self.stops.get(self.target).is_some_and(|stop| place.distance((stop.x, stop.y)) < TRIM_NEAR_M);
-        if near {
-            return;
-        }
-        let least = self.map.limits().least_gain_m2;
-        let seen = self.stops[self.target.min(self.stops.len())..]
-            .iter()
-            .take(TRIM_AHEAD)
-            .take_while(|stop| {
-                stop.look && self.seen.gain_m2(&self.map, &self.to_see, stop.x, stop.y) < least
-            })
-            .count();
-        let to = self.target + seen;
-        if seen > 0
-            && let Some(stop) = self.stops.get(to)
-        {
-            self.planner.begin(&self.map, (place.x, place.y), (stop.x, stop.y));
-            self.stage = Stage::Trim(to);
-        }
-    }
-
-    fn work_on_trim(&mut self, to: usize) -> Work {
-        match self.planner.advance(&self.map, ROUTE_NODES) {
-            Step::Working => self.stage = Stage::Trim(to),
-            Step::None => self.stage = Stage::Ready,
-            Step::Found => {
-                let after =
-                    self.corners.iter().position(|corner| corner.stop == Some(to)).map_or(0, |at| at + 1);
-                let rest: Vec<Corner> = self.corners.drain(..).skip(after).collect();
-                self.track.clear();
-                self.append_leg(to);
-                for corner in rest {
-                    self.push_corner((corner.x, corner.y), corner.stop);
-                }
-                self.target = to;
-                self.stage = Stage::Ready;
-            }
-        }
-        Work::Idle
-    }
-
-    /// Something stands in the way (`seen_by_sonar`) or the drone does not get on: remembers it, and gives
-    /// the place up that it was flying to after a number of tries. `towards` is the direction of the way.
-    pub fn obstruct(
-        &mut self,
-        place: &Place,
-        towards: f32,
-        cells: &[u8],
-        window: &Window,
-        seen_by_sonar: bool,
-    ) {
-        if !towards.is_finite() {
-            return;
-        }
-        let (sin, cos) = towards.sin_cos();
-        let mut nearest = f32::INFINITY;
-        if seen_by_sonar {
-            let map = &mut self.map;
-            for_each_certain(cells, STANDS_CERTAINTY, |index| {
-                let (x, y) = window.centre(index);
-                let (dx, dy) = (x - place.x, y - place.y);
-                let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
-                if along > 0.0 && along < AHEAD_M && aside.abs() < BESIDE_M {
-                    map.mark_unmapped(x, y);
-                    nearest = nearest.min(along);
-                }
-            });
-        }
-        if !nearest.is_finite() {
-            nearest = self.map.limits().radius_m + UNSEEN_HALF_M;
-            for aside in [-UNSEEN_HALF_M, 0.0, UNSEEN_HALF_M] {
-                self.map.mark_unmapped(
-                    place.x + nearest * cos - aside * sin,
-                    place.y + nearest * sin + aside * cos,
-                );
-            }
-        }
-        let (x, y) = (place.x + nearest * cos, place.y + nearest * sin);
-        if let Some(door) = self.map.door_near(x, y, DOOR_M) {
-            self.map.set_door(door, true);
-            self.review = true;
-            // The line between the posts is marked too: it survives a restart, the door's state does not.
-            if let Some(door) = self.map.doors().get(door).cloned() {
-                for i in 0..=8 {
-                    let t = i as f32 / 8.0;
-                    self.map.mark_unmapped(
-                        door.a.0 + t * (door.b.0 - door.a.0),
-                        door.a.1 + t * (door.b.1 - door.a.1),
-                    );
-                }
-            }
-        }
-        self.count_try();
-    }
-
-    fn count_try(&mut self) {
-        let Some(stop) = self.stops.get(self.target).filter(|stop| stop.look) else {
-            return;
-        };
-        if (self.tried.0 - stop.x).hypot(self.tried.1 - stop.y) < SAME_STOP_M {
-            self.tries += 1;
-        } else {
-            (self.tried, self.tries) = ((stop.x, stop.y), 1);
-        }
-        if self.tries >= self.max_tries && self.given_up.len() < MAX_GIVEN_UP {
-            self.given_up.push((stop.x, stop.y));
-            self.tries = 0;
-        }
     }
 
     /// Corner that is flown to.

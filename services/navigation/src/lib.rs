@@ -21,11 +21,14 @@ pub mod config;
 pub mod core;
 pub mod journey;
 pub mod mission;
+mod obstruct;
 pub mod place;
 mod report;
 pub mod senses;
 mod service;
 pub mod steer;
 pub mod track;
+mod trim;
+mod words;
 
 pub use service::Navigation;

@@ -63,7 +63,8 @@ impl Bench {
                 pings.push((ping.header.stamp_ns, ping.sensors));
                 let mut echo = Echo { ping_ns: self.system.now(), ping: ping.ping, ..Echo::default() };
                 let sensors = (0..16u8).filter(|s| ping.sensors >> s & 1 == 1);
-                if sensors.fold(true, |all, s| answer(s, &mut echo) && all) {
+                let answered = sensors.filter(|s| answer(*s, &mut echo)).count();
+                if answered == ping.sensors.count_ones() as usize {
                     self.echoes.publish(&echo);
                 }
             }

@@ -1,3 +1,5 @@
+mod batch;
+
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, OnceLock};
 

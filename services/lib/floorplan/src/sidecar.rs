@@ -104,6 +104,18 @@ impl Door {
 }
 
 impl Area {
+    /// The middle of its corners, plan frame.
+    pub fn middle(&self) -> (f32, f32) {
+        match self {
+            Self::Rectangle([ax, ay, bx, by]) => (0.5 * (ax + bx), 0.5 * (ay + by)),
+            Self::Polygon(corners) => {
+                let count = corners.len().max(1) as f32;
+                let (x, y) = corners.iter().fold((0.0, 0.0), |sum, corner| (sum.0 + corner.0, sum.1 + corner.1));
+                (x / count, y / count)
+            }
+        }
+    }
+
     /// Whether a place lies inside.
     pub fn contains(&self, x: f32, y: f32) -> bool {
         match self {

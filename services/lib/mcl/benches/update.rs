@@ -25,8 +25,9 @@ fn plan() -> (String, Plan, (f32, f32)) {
     named.unwrap_or_else(|| {
         let rows: Vec<String> = (0..200)
             .map(|iy| {
-                let solid =
-                    |ix: usize| ix % 199 == 0 || iy % 199 == 0 || (ix % 50 / 6 == 4 && iy % 50 / 6 == 4);
+                let solid = |ix: usize| {
+                    [0, 199].contains(&ix) || [0, 199].contains(&iy) || (ix % 50 / 6 == 4 && iy % 50 / 6 == 4)
+                };
                 (0..200).map(|ix| if solid(ix) { '#' } else { ' ' }).collect()
             })
             .collect();

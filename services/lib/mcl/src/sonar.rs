@@ -160,6 +160,8 @@ struct Row {
 /// One reading made ready to weigh particles.
 struct Beam {
     bearing: f32,
+    /// Cosine and sine of the bearing.
+    direction: (f32, f32),
     mount_x: f32,
     mount_y: f32,
     /// Likelihood to one who does not know the place.
@@ -180,6 +182,8 @@ pub(crate) struct Beams {
     used: usize,
     scale: f32,
     yaw: f32,
+    /// Room for what passes between the loops of one block.
+    columns: Box<[[f32; BLOCK]; 9]>,
 }
 
 impl Beams {
@@ -200,6 +204,7 @@ impl Beams {
             .collect();
         let beam = || Beam {
             bearing: 0.0,
+            direction: (1.0, 0.0),
             mount_x: 0.0,
             mount_y: 0.0,
             blind: 1.0,
@@ -214,6 +219,7 @@ impl Beams {
             used: 0,
             scale: STEPS as f32 / config.max_range,
             yaw: 0.0,
+            columns: Box::new([[0.0; BLOCK]; 9]),
         }
     }
 
@@ -233,6 +239,7 @@ impl Beams {
             let Some(echo) = model.levelled(reading, sweep) else { continue };
             let beam = &mut self.beams[self.used];
             beam.bearing = reading.bearing_rad;
+            beam.direction = (reading.bearing_rad.cos(), reading.bearing_rad.sin());
             beam.mount_x = reading.mount_x;
             beam.mount_y = reading.mount_y;
             beam.blind = model.blind_likelihood(echo);
@@ -277,19 +284,31 @@ impl Beams {
         }
         let n = x.len().min(BLOCK);
         let (x, y, offset, weight) = (&x[..n], &y[..n], &heading_offset[..n], &mut weight[..n]);
-        let (mut sin, mut cos) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+        let [sin, cos, sensor_x, sensor_y, angle, axis_cos, axis_sin, expected, product] = &mut *self.columns;
         for i in 0..n {
             (sin[i], cos[i]) = sin_cos(self.yaw + offset[i]);
         }
-        let mut product = [1.0f32; BLOCK];
+        product.fill(1.0);
         for beam in &mut self.beams[..self.used] {
             let axis = self.yaw + beam.bearing;
+            for i in 0..n {
+                sensor_x[i] = x[i] + cos[i] * beam.mount_x - sin[i] * beam.mount_y;
+                sensor_y[i] = y[i] + sin[i] * beam.mount_x + cos[i] * beam.mount_y;
+                angle[i] = axis + offset[i];
+                axis_cos[i] = cos[i] * beam.direction.0 - sin[i] * beam.direction.1;
+                axis_sin[i] = sin[i] * beam.direction.0 + cos[i] * beam.direction.1;
+            }
+            map.ranges(
+                &sensor_x[..n],
+                &sensor_y[..n],
+                &angle[..n],
+                &axis_cos[..n],
+                &axis_sin[..n],
+                &mut expected[..n],
+            );
             let mut evidence = 0.0;
             for i in 0..n {
-                let sensor_x = x[i] + cos[i] * beam.mount_x - sin[i] * beam.mount_y;
-                let sensor_y = y[i] + sin[i] * beam.mount_x + cos[i] * beam.mount_y;
-                let expected = map.range(sensor_x, sensor_y, axis + offset[i]);
-                let factor = beam.factor[entry(expected * self.scale)];
+                let factor = beam.factor[entry(expected[i] * self.scale)];
                 product[i] *= factor;
                 evidence += weight[i] * factor;
             }

@@ -1,5 +1,11 @@
 //! A drone that flies exactly as told, and sonars that hear exactly what their cones meet, in an ASCII world.
-#![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "shared by several test binaries")]
+#![allow(
+    dead_code,
+    unreachable_pub,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "shared by several test binaries"
+)]
 
 use avoid::grid::{insert, scroll};
 use avoid::{CELLS, GridRules, Histogram, SECTORS, WallLayer, Window, wrap};
@@ -230,29 +236,6 @@ pub fn follow(world: &World, line: &[(f32, f32)], seconds: f32) -> Flown {
         flown.path.push((drone.x, drone.y));
         now += STEP_NS;
         flown.seconds += 0.05;
-        if std::env::var("TRACE").is_ok() && (flown.seconds * 20.0) as u32 % 10 == 0 {
-            eprintln!(
-                "{:.1} x {:.2} y {:.2} h {:.2} v {:.2} {:.2} {:?} dir {:.2} tgt {:.2} free {:.2} al {:.2} as {:.2} gap {:.2} near {:?}",
-                flown.seconds,
-                drone.x,
-                drone.y,
-                drone.heading,
-                steer.velocity.0,
-                steer.velocity.1,
-                steer.reason,
-                steer.direction,
-                steer.target,
-                steer.free_m,
-                bench.track.along(),
-                bench.track.aside(),
-                world.gap(drone.x, drone.y),
-                bench
-                    .senses
-                    .near(now, 0.5)
-                    .map(|(b, d)| format!("{:.0}:{:.2}", b.to_degrees(), d))
-                    .collect::<Vec<_>>()
-            );
-        }
         if bench.track.remaining() < 0.15 {
             flown.arrived = true;
             break;

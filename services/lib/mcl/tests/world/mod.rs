@@ -116,14 +116,13 @@ impl World {
             if t > 6.0 {
                 return (t, PI);
             }
-            let incidence;
-            if tx < ty {
+            let incidence = if tx < ty {
                 ix += if cos > 0.0 { 1 } else { -1 };
-                incidence = cos.abs().min(1.0).acos();
+                cos.abs().min(1.0).acos()
             } else {
                 iy += if sin > 0.0 { 1 } else { -1 };
-                incidence = sin.abs().min(1.0).acos();
-            }
+                sin.abs().min(1.0).acos()
+            };
             if self.is_solid(ix, iy) {
                 return (t, incidence);
             }
@@ -300,8 +299,8 @@ pub(crate) fn fly(world: &World, trial: &Trial) -> Log {
             }
             let speed = 0.5f32.min(far);
             let wish = [(dx / far * speed - vx) * 2.0, (dy / far * speed - vy) * 2.0];
-            for k in 0..2 {
-                gust[k] += -gust[k] * h + 0.2 * (2.0 * h).sqrt() * normal(&mut g);
+            for gust in &mut gust {
+                *gust += -*gust * h + 0.2 * (2.0 * h).sqrt() * normal(&mut g);
             }
             let a = [wish[0].clamp(-1.2, 1.2), wish[1].clamp(-1.2, 1.2)];
             heading += 0.2 * h;

@@ -1,0 +1,86 @@
+//! What was found in the way: marked on the map, doors taken for shut, places given up after a number of tries.
+
+use crate::journey::{Journey, MAX_GIVEN_UP, SAME_STOP_M};
+use crate::place::Place;
+use crate::steer::STANDS_CERTAINTY;
+use avoid::Window;
+use avoid::swath::for_each_certain;
+
+/// Things are taken for standing in the way this far ahead and this far to the side, metres.
+const AHEAD_M: f32 = 1.3;
+const BESIDE_M: f32 = 0.45;
+/// A blockage nearer than this to a door's line is the door, metres: a leaf is ajar by a little.
+const DOOR_M: f32 = 0.35;
+/// Half of the stretch stamped when nothing was seen and still there was no progress, metres.
+const UNSEEN_HALF_M: f32 = 0.15;
+
+impl Journey {
+    /// Something stands in the way (`seen_by_sonar`) or the drone does not get on: remembers it, and gives
+    /// the place up that it was flying to after a number of tries. `towards` is the direction of the way.
+    pub fn obstruct(
+        &mut self,
+        place: &Place,
+        towards: f32,
+        cells: &[u8],
+        window: &Window,
+        seen_by_sonar: bool,
+    ) {
+        if !towards.is_finite() {
+            return;
+        }
+        let (sin, cos) = towards.sin_cos();
+        let mut nearest = f32::INFINITY;
+        if seen_by_sonar {
+            let map = &mut self.map;
+            for_each_certain(cells, STANDS_CERTAINTY, |index| {
+                let (x, y) = window.centre(index);
+                let (dx, dy) = (x - place.x, y - place.y);
+                let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
+                if along > 0.0 && along < AHEAD_M && aside.abs() < BESIDE_M {
+                    map.mark_unmapped(x, y);
+                    nearest = nearest.min(along);
+                }
+            });
+        }
+        if !nearest.is_finite() {
+            nearest = self.map.limits().radius_m + UNSEEN_HALF_M;
+            for aside in [-UNSEEN_HALF_M, 0.0, UNSEEN_HALF_M] {
+                self.map.mark_unmapped(
+                    place.x + nearest * cos - aside * sin,
+                    place.y + nearest * sin + aside * cos,
+                );
+            }
+        }
+        let (x, y) = (place.x + nearest * cos, place.y + nearest * sin);
+        if let Some(door) = self.map.door_near(x, y, DOOR_M) {
+            self.map.set_door(door, true);
+            self.review = true;
+            // The line between the posts is marked too: it survives a restart, the door's state does not.
+            if let Some(door) = self.map.doors().get(door).cloned() {
+                for i in 0..=8 {
+                    let t = i as f32 / 8.0;
+                    self.map.mark_unmapped(
+                        door.a.0 + t * (door.b.0 - door.a.0),
+                        door.a.1 + t * (door.b.1 - door.a.1),
+                    );
+                }
+            }
+        }
+        self.count_try();
+    }
+
+    fn count_try(&mut self) {
+        let Some(stop) = self.stops.get(self.target).filter(|stop| stop.look) else {
+            return;
+        };
+        if (self.tried.0 - stop.x).hypot(self.tried.1 - stop.y) < SAME_STOP_M {
+            self.tries += 1;
+        } else {
+            (self.tried, self.tries) = ((stop.x, stop.y), 1);
+        }
+        if self.tries >= self.max_tries && self.given_up.len() < MAX_GIVEN_UP {
+            self.given_up.push((stop.x, stop.y));
+            self.tries = 0;
+        }
+    }
+}
