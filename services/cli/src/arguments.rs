@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Sereno: a night watchman for the inside of a building.
 #[derive(Debug, Parser)]
 #[command(name = "sereno", version, about, propagate_version = true)]
-pub struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     pub place: Place,
     /// Print JSON for programs instead of text for people.
@@ -19,7 +19,7 @@ pub struct Arguments {
 }
 
 #[derive(Debug, Subcommand)]
-pub enum Verb {
+pub(crate) enum Verb {
     /// Start the supervised system; the first Ctrl-C in flight lands, then stops.
     Up(Up),
     /// Show the services of the running system.
@@ -84,7 +84,7 @@ pub enum Verb {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum PatrolOrder {
+pub(crate) enum PatrolOrder {
     /// Take off if need be and fly the round; after a pause, go on.
     Start,
     /// Hover and keep the round.
@@ -104,7 +104,7 @@ impl From<PatrolOrder> for Order {
 }
 
 #[derive(Debug, Subcommand)]
-pub enum TopicOrder {
+pub(crate) enum TopicOrder {
     /// List topics with their publishers and subscribers.
     List,
     /// Print messages as they come, one JSON object a line.
@@ -124,7 +124,7 @@ pub enum TopicOrder {
 }
 
 #[derive(Debug, Args)]
-pub struct Up {
+pub(crate) struct Up {
     /// Fly in the simulator; no real device can be opened.
     #[arg(long)]
     pub sim: bool,
@@ -140,7 +140,7 @@ pub struct Up {
 }
 
 #[derive(Debug, Args)]
-pub struct Rehearse {
+pub(crate) struct Rehearse {
     /// Plan in ROS `map_server` form.
     #[arg(long)]
     pub plan: Option<PathBuf>,
@@ -174,7 +174,7 @@ pub struct Rehearse {
 }
 
 #[derive(Debug, Args)]
-pub struct Demo {
+pub(crate) struct Demo {
     /// Exit non-zero unless the round ended on the pad without a contact.
     #[arg(long)]
     pub once: bool,

@@ -6,7 +6,7 @@ use runtime::{Cache, Service, Start, Validate};
 use std::path::Path;
 use std::process::ExitCode;
 
-pub fn graph(place: &Place, json: bool) -> Result<ExitCode> {
+pub(crate) fn graph(place: &Place, json: bool) -> Result<ExitCode> {
     let (manifest, _) = place.manifest(false)?;
     if json {
         let rows: Vec<_> = manifest
@@ -25,7 +25,7 @@ pub fn graph(place: &Place, json: bool) -> Result<ExitCode> {
 }
 
 /// Manifest, every configuration, the vehicle, the plan and its pad.
-pub fn check(place: &Place, json: bool) -> Result<ExitCode> {
+pub(crate) fn check(place: &Place, json: bool) -> Result<ExitCode> {
     let mut said = Vec::new();
     for sim in [false, true] {
         let (manifest, root) = place.manifest(sim)?;

@@ -83,7 +83,7 @@ fn wait_until_ready(place: &Place, system: &mut System) -> Result<()> {
     }
 }
 
-pub fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
+pub(crate) fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;

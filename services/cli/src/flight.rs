@@ -102,6 +102,24 @@ impl Flight {
         self.run_for(REST_NS as f64 * 1e-9);
     }
 
+    /// The score, and the picture of the flight as SVG.
+    #[must_use]
+    pub fn finish_with_picture(self, title: &str, labels: &[(String, f32, f32)]) -> (FlightScore, String) {
+        let track = self.witness.track.clone();
+        let coverage = self.witness.scorer().coverage().clone();
+        let score = self.witness.finish(&self.world, self.seed);
+        let picture = Picture {
+            title,
+            world: &self.world,
+            coverage: &coverage,
+            track: &track,
+            report: &score.report,
+            labels,
+        };
+        let drawn = picture.draw();
+        (score, drawn)
+    }
+
     /// The score of the flight.
     #[must_use]
     pub fn finish(self) -> FlightScore {

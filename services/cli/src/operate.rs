@@ -13,7 +13,7 @@ const GLANCE: Duration = Duration::from_millis(10);
 
 /// What an operator may order.
 #[derive(Debug, Clone, Copy)]
-pub enum Order {
+pub(crate) enum Order {
     TakeOff,
     Land,
     Hold,
@@ -40,7 +40,7 @@ impl Order {
     }
 }
 
-pub fn give(place: &Place, order: Order, json: bool) -> Result<ExitCode> {
+pub(crate) fn give(place: &Place, order: Order, json: bool) -> Result<ExitCode> {
     let (manifest, _, run_dir) = place.running()?;
     let mut tool = runtime::Tool::join("cli", manifest, &run_dir)?;
     let mut orders = Orders::open(&mut tool.ports)?;

@@ -71,7 +71,7 @@ fn fly(setup: &Setup, seed: u64, pictures: Option<&PathBuf>) -> Result<Flown> {
     Ok(Flown { score, simulated_s })
 }
 
-pub fn run(place: &Place, order: &Rehearse, json: bool) -> Result<ExitCode> {
+pub(crate) fn run(place: &Place, order: &Rehearse, json: bool) -> Result<ExitCode> {
     if order.flights == 0 || order.flights > 100_000 {
         bail!("--flights {} is out of range: allowed is 1..=100000", order.flights);
     }

@@ -13,7 +13,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// A landing from any height and the end of all services.
 const DOWN_PATIENCE: Duration = Duration::from_secs(90);
 
-pub fn up(place: &Place, up: &Up) -> Result<ExitCode> {
+pub(crate) fn up(place: &Place, up: &Up) -> Result<ExitCode> {
     let options = supervisor::Options {
         manifests: place.manifest_files(up.sim)?,
         run_dir: Some(place.run_dir()?),
@@ -40,7 +40,7 @@ fn print_rows(rows: &[ServiceRow]) {
     }
 }
 
-pub fn ps(place: &Place, json: bool) -> Result<ExitCode> {
+pub(crate) fn ps(place: &Place, json: bool) -> Result<ExitCode> {
     let overview = client(place)?.ps()?;
     if json {
         println!("{}", serde_json::to_string(&overview)?);
@@ -60,19 +60,19 @@ fn show(row: &ServiceRow, json: bool) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-pub fn restart(place: &Place, service: &str, in_flight: bool, json: bool) -> Result<ExitCode> {
+pub(crate) fn restart(place: &Place, service: &str, in_flight: bool, json: bool) -> Result<ExitCode> {
     show(&client(place)?.restart(service, in_flight, PATIENCE)?, json)
 }
 
-pub fn hold(place: &Place, service: &str, in_flight: bool, json: bool) -> Result<ExitCode> {
+pub(crate) fn hold(place: &Place, service: &str, in_flight: bool, json: bool) -> Result<ExitCode> {
     show(&client(place)?.hold(service, in_flight, PATIENCE)?, json)
 }
 
-pub fn release(place: &Place, service: &str, json: bool) -> Result<ExitCode> {
+pub(crate) fn release(place: &Place, service: &str, json: bool) -> Result<ExitCode> {
     show(&client(place)?.release(service, PATIENCE)?, json)
 }
 
-pub fn logs(place: &Place, service: &str, lines: usize, json: bool) -> Result<ExitCode> {
+pub(crate) fn logs(place: &Place, service: &str, lines: usize, json: bool) -> Result<ExitCode> {
     let lines = client(place)?.logs(service, lines)?;
     if json {
         println!("{}", serde_json::to_string(&lines)?);
@@ -84,7 +84,7 @@ pub fn logs(place: &Place, service: &str, lines: usize, json: bool) -> Result<Ex
     Ok(ExitCode::SUCCESS)
 }
 
-pub fn down(place: &Place, now: bool, json: bool) -> Result<ExitCode> {
+pub(crate) fn down(place: &Place, now: bool, json: bool) -> Result<ExitCode> {
     client(place)?.stop(now, DOWN_PATIENCE)?;
     println!("{}", if json { "{\"stopped\":true}" } else { "stopped" });
     Ok(ExitCode::SUCCESS)

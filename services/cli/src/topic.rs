@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// Short against the fastest topic (200 Hz).
 const GLANCE: Duration = Duration::from_millis(2);
 
-pub fn run(place: &Place, order: &TopicOrder, json: bool) -> Result<ExitCode> {
+pub(crate) fn run(place: &Place, order: &TopicOrder, json: bool) -> Result<ExitCode> {
     match order {
         TopicOrder::List => list(place, json),
         TopicOrder::Echo { topic, count } => watch(place, topic, What::Echo(*count)),
