@@ -34,8 +34,26 @@ macro_rules! topics {
     };
 }
 topics!(
-    SonarRanges, FlowMotion, Ping, Echo, Truth, Attitude, FlightState, Power, Pose, Particles, Grid, Polar,
-    Setpoint, Patrol, Channels, PilotState, Sticks, Command, Health, Trace,
+    SonarRanges,
+    FlowMotion,
+    Ping,
+    Echo,
+    Truth,
+    Attitude,
+    FlightState,
+    Power,
+    Pose,
+    Particles,
+    Grid,
+    Polar,
+    Setpoint,
+    Patrol,
+    Channels,
+    PilotState,
+    Sticks,
+    Command,
+    Health,
+    Trace,
 );
 
 #[cfg(test)]

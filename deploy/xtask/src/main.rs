@@ -58,7 +58,8 @@ fn cargo(root: &Path, arguments: &[&str]) -> Result<()> {
     println!("$ cargo {}", arguments.join(" "));
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let began = Instant::now();
-    let status = Command::new(cargo).args(arguments).current_dir(root).status().context("cannot run cargo")?;
+    let status =
+        Command::new(cargo).args(arguments).current_dir(root).status().context("cannot run cargo")?;
     println!("  {:.0} s", began.elapsed().as_secs_f64());
     if !status.success() {
         bail!("cargo {} failed", arguments.join(" "));
@@ -67,9 +68,8 @@ fn cargo(root: &Path, arguments: &[&str]) -> Result<()> {
 }
 
 /// Executables of the system: one a service, the supervisor and the command line.
-const PROGRAMS: [&str; 9] = [
-    "cli", "supervisor", "sonar", "flow", "flight", "localization", "navigation", "pilot", "simulator",
-];
+const PROGRAMS: [&str; 9] =
+    ["cli", "supervisor", "sonar", "flow", "flight", "localization", "navigation", "pilot", "simulator"];
 
 fn build_programs(root: &Path) -> Result<PathBuf> {
     println!("Building the services, the supervisor and the command line (a few minutes the first time):");

@@ -33,7 +33,8 @@ fn main() -> Result<()> {
     let mut controller = ports.input::<FlightState>(4)?;
     let mut setpoint = ports.input::<Setpoint>(16)?;
     let mut poses = ports.input::<Pose>(16)?;
-    let (mut controller_said, mut wished, mut pose) = (FlightState::default(), Setpoint::default(), Pose::default());
+    let (mut controller_said, mut wished, mut pose) =
+        (FlightState::default(), Setpoint::default(), Pose::default());
     let began = std::time::Instant::now();
     let mut ordered = false;
     for half_second in 1..=(2.0 * seconds) as u64 {
@@ -55,16 +56,35 @@ fn main() -> Result<()> {
         let pilot = flight.witness.last_pilot.unwrap_or_default();
         println!(
             "{:6.1} true {:6.2} {:6.2} {:5.2} v {:5.2} {:5.2} {:5.2} tilt {:5.1} {:5.1} yaw {:4.0} | off {:5.2} head {:4.0} v {:5.2} {:5.2} sigma {:.2} n {} lost {:.2} state {} | {} h {:.2} | wish {} {:5.2} {:5.2} | thr {} | near {:.2} c {} | {} | {} | {}",
-            truth.time_s, truth.x_m, truth.y_m, truth.z_m,
-            truth.velocity_x_m_s, truth.velocity_y_m_s, truth.velocity_z_m_s,
-            truth.roll_rad.to_degrees(), truth.pitch_rad.to_degrees(), truth.yaw_rad.to_degrees(),
-            flight.witness.error_m().unwrap_or(f32::NAN), pose.heading_rad.to_degrees(),
-            pose.velocity_x_m_s, pose.velocity_y_m_s, pose.sigma_m(), pose.particles, pose.p_lost, pose.state,
-            flight.witness.phase(), pilot.height_m,
-            wished.kind, wished.velocity_x_m_s, wished.velocity_y_m_s,
+            truth.time_s,
+            truth.x_m,
+            truth.y_m,
+            truth.z_m,
+            truth.velocity_x_m_s,
+            truth.velocity_y_m_s,
+            truth.velocity_z_m_s,
+            truth.roll_rad.to_degrees(),
+            truth.pitch_rad.to_degrees(),
+            truth.yaw_rad.to_degrees(),
+            flight.witness.error_m().unwrap_or(f32::NAN),
+            pose.heading_rad.to_degrees(),
+            pose.velocity_x_m_s,
+            pose.velocity_y_m_s,
+            pose.sigma_m(),
+            pose.particles,
+            pose.p_lost,
+            pose.state,
+            flight.witness.phase(),
+            pilot.height_m,
+            wished.kind,
+            wished.velocity_x_m_s,
+            wished.velocity_y_m_s,
             controller_said.channels_us[2],
-            truth.clearance_m, truth.contacts,
-            pilot.text, flight.witness.round.text, controller_said.reason,
+            truth.clearance_m,
+            truth.contacts,
+            pilot.text,
+            flight.witness.round.text,
+            controller_said.reason,
         );
         if flight.witness.landed() {
             break;

@@ -66,7 +66,8 @@ fn wait_until_ready(place: &Place, system: &mut System) -> Result<()> {
         if let Ok(Some(status)) = system.0.try_wait() {
             bail!("the system ended at once: {status}");
         }
-        let rows = supervisor::Client::connect(&run_dir).and_then(|mut client| client.ps()).map(|all| all.services);
+        let rows =
+            supervisor::Client::connect(&run_dir).and_then(|mut client| client.ps()).map(|all| all.services);
         match rows {
             Ok(rows) if !rows.is_empty() && rows.iter().all(|row| row.state == "running") => return Ok(()),
             Ok(rows) if began.elapsed() > READY => {
@@ -122,7 +123,12 @@ fn fly(place: &Place, demo: &Demo, stop: &AtomicBool, json: bool) -> Result<(Fli
         witness.look(&world);
         if !witness.flown() && last_order.is_none_or(|at| at.elapsed() > ORDER_AGAIN) {
             last_order = Some(Instant::now());
-            orders.give(Verb::PatrolStart, f32::NAN, f32::NAN, number.wrapping_add(began.elapsed().as_secs() as u32));
+            orders.give(
+                Verb::PatrolStart,
+                f32::NAN,
+                f32::NAN,
+                number.wrapping_add(began.elapsed().as_secs() as u32),
+            );
         }
         if last_line.elapsed() >= Duration::from_secs(1) {
             last_line += Duration::from_secs(1);
@@ -183,10 +189,18 @@ fn show(report: &FlightReport, demo: &Demo, json: bool) -> Result<()> {
     }
     println!();
     println!("{}: {} contacts, nearest {:.2} m", report.outcome, report.contacts, report.min_clearance_m);
-    println!("{:.0} m in {:.0} s, {:.1} % of what can be seen was seen", report.distance_m, report.time_s,
-        100.0 * report.coverage);
+    println!(
+        "{:.0} m in {:.0} s, {:.1} % of what can be seen was seen",
+        report.distance_m,
+        report.time_s,
+        100.0 * report.coverage
+    );
     if let (Some(median), Some(p95)) = (report.loc_error_m.median, report.loc_error_m.p95) {
-        println!("position off by {:.1} cm in the median, {:.1} cm at the 95th percentile", 100.0 * median, 100.0 * p95);
+        println!(
+            "position off by {:.1} cm in the median, {:.1} cm at the 95th percentile",
+            100.0 * median,
+            100.0 * p95
+        );
     }
     for failsafe in &report.failsafes {
         println!("failsafe: {failsafe}");

@@ -106,9 +106,7 @@ pub fn vehicle_file(deploy: &Path, name: &str) -> Result<String> {
         return Ok(relative);
     }
     let known = std::fs::read_dir(deploy.join("vehicles")).with_context(|| "no vehicles/ directory")?;
-    let names: Vec<String> = known
-        .flatten()
-        .filter_map(|entry| Some(entry.path().file_stem()?.to_str()?.to_owned()))
-        .collect();
+    let names: Vec<String> =
+        known.flatten().filter_map(|entry| Some(entry.path().file_stem()?.to_str()?.to_owned())).collect();
     bail!("no vehicle {name}: known are {}, or give a file", names.join(", "));
 }

@@ -79,7 +79,9 @@ pub(crate) fn run(place: &Place, order: &Rehearse, json: bool) -> Result<ExitCod
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let threads = order.threads.unwrap_or(cores).clamp(1, 256);
     let progress = if json { ProgressBar::hidden() } else { ProgressBar::new(order.flights) };
-    progress.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} flights, {elapsed} gone, {eta} to go  {msg}")?);
+    progress.set_style(ProgressStyle::with_template(
+        "{bar:30} {pos}/{len} flights, {elapsed} gone, {eta} to go  {msg}",
+    )?);
 
     let next = AtomicU64::new(0);
     let flown: Mutex<Vec<(u64, Flown)>> = Mutex::new(Vec::new());
@@ -96,7 +98,11 @@ pub(crate) fn run(place: &Place, order: &Rehearse, json: bool) -> Result<ExitCod
                     }
                     match fly(&setup, order.seed + k, order.pictures.as_ref()) {
                         Ok(done) => {
-                            progress.set_message(format!("seed {}: {}", order.seed + k, done.score.report.outcome));
+                            progress.set_message(format!(
+                                "seed {}: {}",
+                                order.seed + k,
+                                done.score.report.outcome
+                            ));
                             flown.lock().unwrap_or_else(PoisonError::into_inner).push((k, done));
                         }
                         Err(error) => *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error),
@@ -142,8 +148,10 @@ fn figure(value: Option<f64>) -> String {
 }
 
 fn print(report: &Report) {
-    println!("{:>5}  {:<18} {:>8} {:>9} {:>7} {:>7} {:>9} {:>7} {:>7}  remarks", "seed", "outcome", "contacts",
-        "clear m", "time s", "way m", "coverage", "err m", "p95 m");
+    println!(
+        "{:>5}  {:<18} {:>8} {:>9} {:>7} {:>7} {:>9} {:>7} {:>7}  remarks",
+        "seed", "outcome", "contacts", "clear m", "time s", "way m", "coverage", "err m", "p95 m"
+    );
     for flight in &report.flights {
         let mut remarks = flight.failsafes.clone();
         remarks.extend(flight.skipped.iter().map(|skipped| format!("skipped {skipped}")));

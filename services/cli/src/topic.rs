@@ -27,7 +27,8 @@ fn list(place: &Place, json: bool) -> Result<ExitCode> {
                 "subscribers": topic.subscribers, "retained": topic.retained });
             println!("{row}");
         } else {
-            let readers = if topic.subscribers.is_empty() { "-".to_owned() } else { topic.subscribers.join(", ") };
+            let readers =
+                if topic.subscribers.is_empty() { "-".to_owned() } else { topic.subscribers.join(", ") };
             println!("{:<24} {:>6.1} Hz  {} -> {readers}", topic.name, topic.hz, topic.publishers.join(", "));
         }
     }
@@ -43,7 +44,8 @@ fn watch(place: &Place, topic: &str, what: What) -> Result<ExitCode> {
     let (manifest, _, run_dir) = place.running()?;
     let mut tool = Tool::join("cli", manifest, &run_dir)?;
     let mut watch = Watch { ports: &mut tool.ports, topic, what };
-    visit_topic(topic, &mut watch).with_context(|| format!("there is no topic {topic}: see `sereno topic list`"))?
+    visit_topic(topic, &mut watch)
+        .with_context(|| format!("there is no topic {topic}: see `sereno topic list`"))?
 }
 
 struct Watch<'a> {
@@ -101,6 +103,10 @@ fn rate<T: Message>(input: &mut Input<T>, topic: &str, seconds: f64, json: bool)
                 "lost": input.lost() })
         );
     } else {
-        println!("{topic}: {hz:.1} Hz over {} messages, longest gap {longest:.1} ms, {} lost", stamps.len(), input.lost());
+        println!(
+            "{topic}: {hz:.1} Hz over {} messages, longest gap {longest:.1} ms, {} lost",
+            stamps.len(),
+            input.lost()
+        );
     }
 }

@@ -4,8 +4,8 @@ use airframe::picture::Track;
 use airframe::score::{Ending, FlightScore, Observation, Scorer};
 use airframe::world::World;
 use ipc_types::{
-    Command, FailsafeAction, FailsafeCause, Patrol, PatrolState, Phase, PilotState, Pose, RoomState, Text, Truth,
-    Verb,
+    Command, FailsafeAction, FailsafeCause, Patrol, PatrolState, Phase, PilotState, Pose, RoomState, Text,
+    Truth, Verb,
 };
 use manifest::Body;
 use runtime::{Input, Output, Ports, StartError};
@@ -100,7 +100,7 @@ pub struct Round {
 }
 
 impl Witness {
-    /// Opens the ports of a scorer. 
+    /// Opens the ports of a scorer.
     ///
     /// # Errors
     /// When the manifest does not allow it.

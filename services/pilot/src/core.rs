@@ -209,6 +209,15 @@ impl PilotCore {
         }
     }
 
+    /// Where the drone was a moment ago, plan frame; `None` while its place is not known or it stands on the
+    /// ground, where echoes may be the floor's.
+    pub(crate) fn place_at(&self, at_ns: u64) -> Option<Vector> {
+        let now = self.last_step_ns?;
+        let back = age_s(Some(at_ns), now).min(0.3);
+        (self.airborne() && self.height.clearance_m() > 0.35 && self.place_known())
+            .then(|| self.motion.place() - self.motion.velocity() * back)
+    }
+
     /// Where the drone stands, for the shield.
     pub(crate) fn footing(&self) -> Footing {
         let known = self.pose.at.is_some() && self.place_known();

@@ -108,7 +108,12 @@ impl PilotCore {
                     SonarStatus::Ok => Echo::Range(reading.range_m),
                     _ => Echo::Nothing,
                 };
-                let look = Look { at_ns: reading.ping_ns, heading: self.heading(), echo };
+                let look = Look {
+                    at_ns: reading.ping_ns,
+                    heading: self.heading(),
+                    place: self.place_at(reading.ping_ns),
+                    echo,
+                };
                 if !self.shield.hear(usize::from(reading.sensor), look) {
                     self.refused += 1;
                 }

@@ -73,10 +73,7 @@ impl MemoryDevice {
     pub fn pair() -> (Self, Self) {
         let a = Rc::new(RefCell::new(VecDeque::with_capacity(MEMORY_CAPACITY)));
         let b = Rc::new(RefCell::new(VecDeque::with_capacity(MEMORY_CAPACITY)));
-        (
-            Self { incoming: Rc::clone(&a), outgoing: Rc::clone(&b) },
-            Self { incoming: b, outgoing: a },
-        )
+        (Self { incoming: Rc::clone(&a), outgoing: Rc::clone(&b) }, Self { incoming: b, outgoing: a })
     }
 }
 

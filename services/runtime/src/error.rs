@@ -49,6 +49,7 @@ pub enum StartError {
 
 impl StartError {
     /// Any other reason, as a sentence.
+    #[expect(clippy::needless_pass_by_value, reason = "taken whole, so that it stands in `map_err`")]
     pub fn invalid(reason: impl ToString) -> Self {
         Self::Invalid(reason.to_string())
     }

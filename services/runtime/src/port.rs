@@ -299,7 +299,7 @@ impl Ports {
         match &self.bus {
             BusKind::Lockstep(bus) => Ok(bus.device(name)),
             BusKind::Shared(node) => {
-                let path = node.device_path(&path)?;
+                let path = node.device_path(path)?;
                 self.devices.device(name, &path)
             }
         }

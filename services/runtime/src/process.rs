@@ -2,9 +2,9 @@
 
 use crate::config::parse_config;
 use crate::device::Devices;
+use crate::notify::Notifier;
 use crate::port::{BusKind, StepContext};
 use crate::shm::{RunDir, SharedNode};
-use crate::notify::Notifier;
 use crate::{Cache, Input, Output, Ports, Service, Start, StartError, fnv};
 use ipc_types::{Health, MAX_PORTS, Message, Text, Trace};
 use manifest::Manifest;
@@ -79,9 +79,10 @@ pub fn load_manifest(paths: &str) -> Result<(Manifest, PathBuf), StartError> {
                 let root = Path::new(path).parent().unwrap_or(Path::new(".")).to_owned();
                 (Manifest::parse(path, &text).map_err(|error| StartError::Manifest(error.to_string()))?, root)
             }
-            Some((manifest, root)) => {
-                (manifest.overlay(path, &text).map_err(|error| StartError::Manifest(error.to_string()))?, root)
-            }
+            Some((manifest, root)) => (
+                manifest.overlay(path, &text).map_err(|error| StartError::Manifest(error.to_string()))?,
+                root,
+            ),
         });
     }
     let (manifest, root) =
@@ -118,10 +119,10 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
     let paths = variable(env::MANIFEST)
         .ok_or_else(|| StartError::Manifest(format!("{} is not set: which manifest?", env::MANIFEST)))?;
     let (manifest, root) = load_manifest(&paths)?;
-    let run_dir = RunDir::new(
-        variable(env::RUN_DIR)
-            .ok_or_else(|| StartError::Manifest(format!("{} is not set: which run directory?", env::RUN_DIR)))?,
-    );
+    let run_dir =
+        RunDir::new(variable(env::RUN_DIR).ok_or_else(|| {
+            StartError::Manifest(format!("{} is not set: which run directory?", env::RUN_DIR))
+        })?);
     let incarnation = number(env::INCARNATION, 0_u32)?;
     let entry = manifest
         .services

@@ -110,7 +110,8 @@ impl Start {
     pub fn plan(&self) -> Result<Arc<Plan>, StartError> {
         let name = &self.system.plan;
         let plan = self.cache.get_or_build(name, || {
-            let header = floorplan::PlanHeader::parse(name, &self.read(name)?).map_err(StartError::invalid)?;
+            let header =
+                floorplan::PlanHeader::parse(name, &self.read(name)?).map_err(StartError::invalid)?;
             let image = Path::new(name).parent().unwrap_or(Path::new("")).join(&header.image);
             let image = self.read(&image.to_string_lossy())?;
             Plan::load(name, &header, &image).map_err(StartError::invalid)

@@ -66,11 +66,12 @@ impl Shared {
 }
 impl Bus for Shared {
     fn ports(&mut self, service: &str) -> Ports {
-        Tool::join(service, manifest(), &self.run_dir).map(|tool| {
-            let Tool { ports, .. } = tool;
-            ports
-        })
-        .unwrap()
+        Tool::join(service, manifest(), &self.run_dir)
+            .map(|tool| {
+                let Tool { ports, .. } = tool;
+                ports
+            })
+            .unwrap()
     }
     fn settle(&mut self) {
         for tool in &self.tools {

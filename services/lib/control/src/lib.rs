@@ -19,6 +19,7 @@ mod liftoff;
 mod motion;
 mod planar;
 mod position;
+mod remembered;
 mod shield;
 pub mod stick;
 mod touchdown;

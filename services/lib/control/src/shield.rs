@@ -7,6 +7,7 @@ use crate::braking::Braking;
 use crate::check::{RangeError, within};
 use crate::held::seconds;
 use crate::planar::{Vector, wrap_angle};
+use crate::remembered::Remembered;
 use floorplan::DistanceField;
 
 /// Most sonars around.
@@ -19,7 +20,11 @@ pub struct ShieldConfig {
     /// Room kept between disc and echo on top of the stopping distance, metres. A centred disc of 0.45 m has
     /// 0.225 m on each side of a door of 0.9 m.
     pub margin_m: f32,
-    /// Things nearer to the disc than this are moved away from, metres (FACTS 8: within 0.55 m of the middle).
+    /// More room kept to what is flown straight at, metres: whoever stands before a wall is shaken by gusts of
+    /// up to 0.3 m/s2, which cost 0.1 to 0.15 m; whoever passes a door soon leaves it.
+    pub standoff_m: f32,
+    /// Things nearer to the disc than this are moved away from, metres: in the
+    /// middle of a 0.9 m door neither jamb is: sonars hear them in turns, and pushes in turns would swing it.
     pub near_m: f32,
     /// Speed away for each metre nearer than `near_m`, 1/s: both jambs of a door push alike, which centres.
     pub push_gain_per_s: f32,
@@ -47,7 +52,8 @@ impl Default for ShieldConfig {
     fn default() -> Self {
         Self {
             margin_m: 0.07,
-            near_m: 0.30,
+            standoff_m: 0.12,
+            near_m: 0.15,
             push_gain_per_s: 0.8,
             max_push_m_s: 0.2,
             look_half_angle_deg: 28.0,
@@ -67,6 +73,7 @@ impl ShieldConfig {
     /// When a value is outside its bounds.
     pub fn validate(&self) -> Result<(), RangeError> {
         within("shield.margin_m", self.margin_m, 0.0, 0.2)?;
+        within("shield.standoff_m", self.standoff_m, 0.0, 0.3)?;
         within("shield.near_m", self.near_m, 0.0, 0.6)?;
         within("shield.push_gain_per_s", self.push_gain_per_s, 0.0, 2.0)?;
         within("shield.max_push_m_s", self.max_push_m_s, 0.0, 0.3)?;
@@ -97,6 +104,8 @@ pub struct Look {
     pub at_ns: u64,
     /// Heading of the body then, plan frame.
     pub heading: f32,
+    /// Middle of the body then, plan frame; `None` when it is not known, and nothing is remembered.
+    pub place: Option<Vector>,
     /// What came back.
     pub echo: Echo,
 }
@@ -136,6 +145,7 @@ pub struct Shield {
     config: ShieldConfig,
     radius_m: f32,
     sensors: [Option<Sensor>; MAX_SENSORS],
+    remembered: Remembered,
     sweep_s: f32,
 }
 
@@ -143,6 +153,8 @@ pub struct Shield {
 const FAR_M: f32 = 4.0;
 /// Directions within a cone that an echo is tried at.
 const ARC: [f32; 7] = [-1.0, -0.667, -0.333, 0.0, 0.333, 0.667, 1.0];
+/// Cosine of the angle from which something begins to be straight ahead (40 degrees; all of it at 28).
+const AHEAD_FROM: f32 = 0.766;
 /// A wish is turned into the nearest watched direction when that is nearer than this, radians.
 const BEND_RAD: f32 = 0.87;
 
@@ -160,7 +172,7 @@ impl Shield {
                 *slot = Some(Sensor { bearing, mount, look: None });
             }
         }
-        Self { config, radius_m, sensors, sweep_s: 0.24 }
+        Self { config, radius_m, sensors, remembered: Remembered::new(), sweep_s: 0.24 }
     }
 
     /// Sets the period of a whole sweep through all sonars, seconds.
@@ -180,6 +192,10 @@ impl Shield {
         match self.sensors.get_mut(sensor) {
             Some(Some(sensor)) if sane && look.heading.is_finite() => {
                 sensor.look = Some(look);
+                if let (Some(place), Echo::Range(range)) = (look.place.and_then(Vector::known), look.echo) {
+                    let face = place + sensor.mount.rotated(look.heading);
+                    self.remembered.hear(look.at_ns, place, face, sensor.bearing + look.heading, range);
+                }
                 true
             }
             _ => false,
@@ -224,23 +240,28 @@ impl Shield {
     }
 
     /// Free way of the disc with its margin in a direction (unit vector, plan frame) by the echoes alone,
-    /// metres: an echo may come from anywhere on the arc across its cone, and the worst place counts.
+    /// metres: a fresh echo may come from anywhere on the arc across its cone, and the worst place counts; one
+    /// that is remembered from `place` counts for the middle of its arc.
     #[must_use]
-    pub fn free_way(&self, now: u64, direction: Vector) -> f32 {
+    pub fn free_way(&self, now: u64, direction: Vector, place: Option<Vector>) -> f32 {
         let wide = self.radius_m + self.config.margin_m;
         let half = self.config.cone_half_angle_deg.to_radians();
         let mut free = FAR_M;
         for ((axis, face, range), _) in self.hits(now) {
             for part in ARC {
                 let point = face + Vector::along(axis + part * half) * range;
-                let ahead = point.dot(direction);
-                let aside = point.cross(direction).abs();
-                if ahead > 0.0 && aside < wide {
-                    free = free.min((ahead - (wide * wide - aside * aside).sqrt()).max(0.0));
-                }
+                free = free.min(way_to(point, direction, wide));
             }
         }
+        for thing in self.things(now, place) {
+            free = free.min(way_to(thing, direction, wide));
+        }
         free
+    }
+
+    /// What was heard a moment ago, from the middle of the drone.
+    fn things(&self, now: u64, place: Option<Vector>) -> impl Iterator<Item = Vector> + '_ {
+        place.into_iter().flat_map(move |place| self.remembered.things(now).map(move |thing| thing - place))
     }
 
     /// Free way of a disc of `radius` by the plan's walls. Inside the radius sliding along and away is free.
@@ -291,7 +312,7 @@ impl Shield {
         }
         let c = &self.config;
         let braking = self.braking();
-        let speed = braking.speed(self.free_way(now, direction));
+        let speed = braking.speed(self.free_way(now, direction, footing.place));
         let (Some(walls), Some(place)) = (walls, footing.place) else { return speed };
         let sigma = if footing.sigma_m.is_finite() { footing.sigma_m.clamp(0.0, 0.08) } else { 0.08 };
         let soft = Self::plan_way(walls, place, direction, self.radius_m + c.plan_margin_m + sigma);
@@ -319,10 +340,13 @@ impl Shield {
         let mut push = Vector::ZERO;
         // What points at a near thing is taken out of the wish, so that the rest may slide along it.
         for _ in 0..2 {
-            for (_, centre) in self.hits(now) {
+            let heard = self.hits(now).map(|(_, centre)| centre);
+            for centre in heard.chain(self.things(now, footing.place)) {
                 let distance = centre.norm();
                 let towards = if distance > 1e-3 { centre * (1.0 / distance) } else { continue };
-                let most = braking.speed(distance - self.radius_m - self.config.margin_m);
+                let ahead = (wish.dot(towards) / wish.norm().max(1e-3) - AHEAD_FROM) / (1.0 - AHEAD_FROM);
+                let room = self.config.margin_m + self.config.standoff_m * (2.0 * ahead).clamp(0.0, 1.0);
+                let most = braking.speed(distance - self.radius_m - room);
                 let excess = velocity.dot(towards) - most;
                 if excess > 0.0 {
                     velocity = velocity - towards * excess;
@@ -365,5 +389,15 @@ impl Shield {
             allowed_m_s,
             limited: (velocity - wish).norm() > 0.02,
         }
+    }
+}
+
+/// Way of a disc of radius `wide` in a direction until its edge is at a point, metres; infinite past it.
+fn way_to(point: Vector, direction: Vector, wide: f32) -> f32 {
+    let (ahead, aside) = (point.dot(direction), point.cross(direction).abs());
+    if ahead > 0.0 && aside < wide {
+        (ahead - (wide * wide - aside * aside).sqrt()).max(0.0)
+    } else {
+        f32::INFINITY
     }
 }

@@ -130,7 +130,7 @@ fn a_step_of_half_a_metre_a_second() {
 #[test]
 fn margins_of_gain_and_delay() {
     // Ringing is measured in the last five of fifteen seconds after a step: what grows is unstable.
-    for (gain, late_ms) in [(1.0, 70), (2.0, 70), (0.5, 70), (1.0, 150), (1.5, 120)] {
+    for (gain, late_ms) in [(1.0, 70), (1.6, 70), (0.5, 70), (1.0, 150), (1.3, 110)] {
         let mut flight = Flight::new(1);
         (flight.velocity_sigma, flight.position_sigma) = (0.0, 0.0);
         (flight.gain, flight.late_ns) = (gain, late_ms * 1_000_000);

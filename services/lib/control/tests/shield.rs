@@ -68,7 +68,7 @@ fn through(start: Vector, wish: Vector, seconds: f32) -> (Vector, f32, f32) {
             let pair = (step / 3 % 4) as usize;
             for sensor in [pair, pair + 4] {
                 let echo = cone(&plan, place, sensor as f32 * FRAC_PI_4);
-                assert!(shield.hear(sensor, Look { at_ns: now, heading: 0.0, echo }));
+                assert!(shield.hear(sensor, Look { at_ns: now, heading: 0.0, place: Some(place), echo }));
             }
         }
         let guarded = shield.guard(now, wish, wish, &at(place), Some(&walls), true);
@@ -114,7 +114,7 @@ fn no_sensor_looking_that_way_no_motion_that_way() {
     let now = 10_000_000_000;
     for k in 0..8 {
         if k != 2 {
-            shield.hear(k, Look { at_ns: now, heading: 0.0, echo: Echo::Nothing });
+            shield.hear(k, Look { at_ns: now, heading: 0.0, place: None, echo: Echo::Nothing });
         }
     }
     assert_eq!(shield.silent(now), (1, 8));
@@ -142,7 +142,7 @@ fn the_plan_stops_what_no_echo_shows() {
     for step in 0..600u64 {
         let now = step * 20_000_000;
         for k in 0..8 {
-            shield.hear(k, Look { at_ns: now, heading: 0.0, echo: Echo::Nothing });
+            shield.hear(k, Look { at_ns: now, heading: 0.0, place: None, echo: Echo::Nothing });
         }
         place +=
             shield.guard(now, Vector::new(0.6, 0.0), Vector::ZERO, &at(place), Some(&walls), true).velocity
@@ -157,7 +157,7 @@ fn near_things_push_and_a_person_ahead_stops() {
     let mut shield = eight();
     for k in 0..8 {
         let echo = if k == 0 { Echo::Range(0.15) } else { Echo::Nothing };
-        shield.hear(k, Look { at_ns: 0, heading: 0.0, echo });
+        shield.hear(k, Look { at_ns: 0, heading: 0.0, place: None, echo });
     }
     let footing = Footing { place: None, sigma_m: 0.0, heading: 0.0 };
     let still = shield.guard(0, Vector::ZERO, Vector::ZERO, &footing, None, true).velocity;
@@ -165,6 +165,32 @@ fn near_things_push_and_a_person_ahead_stops() {
     assert_eq!(shield.guard(0, Vector::ZERO, Vector::ZERO, &footing, None, false).velocity, Vector::ZERO);
     let ahead = shield.guard(0, Vector::new(0.5, 0.0), Vector::ZERO, &footing, None, false).velocity;
     assert!(shield.braking().distance(ahead.x) <= 0.15 + MOUNT - RADIUS);
+}
+
+#[test]
+fn a_box_that_stopped_answering_is_still_there() {
+    let mut shield = eight();
+    let footing = at(Vector::ZERO);
+    let ms = 1_000_000;
+    for turn in 0..2u64 {
+        for k in 0..8 {
+            let echo = if k == 0 { Echo::Range(0.4) } else { Echo::Nothing };
+            shield.hear(k, Look { at_ns: turn * 240 * ms, heading: 0.0, place: Some(Vector::ZERO), echo });
+        }
+    }
+    // Turned by 20 degrees: the face sends the ping elsewhere.
+    let footing = Footing { heading: 0.35, ..footing };
+    let now = 720 * ms;
+    for k in 0..8 {
+        let look = Look { at_ns: now, heading: 0.35, place: Some(Vector::ZERO), echo: Echo::Nothing };
+        shield.hear(k, look);
+    }
+    let left = shield.guard(now, Vector::new(0.5, 0.0), Vector::ZERO, &footing, None, true);
+    assert!(shield.braking().distance(left.velocity.x) <= 0.61 - RADIUS, "{:?}", left.velocity);
+    let aside = shield.guard(now, Vector::new(0.0, 0.5), Vector::ZERO, &footing, None, true);
+    assert!(aside.velocity.y > 0.45);
+    let later = shield.guard(now + 200 * ms, Vector::new(0.5, 0.0), Vector::ZERO, &footing, None, true);
+    assert!(later.velocity.x < 0.45);
 }
 
 proptest! {
@@ -183,7 +209,7 @@ proptest! {
         let now = 10_000_000_000u64;
         for (k, (range, age)) in ranges.iter().zip(&ages).enumerate() {
             let echo = range.map_or(Echo::Nothing, Echo::Range);
-            shield.hear(k, Look { at_ns: now - age * 1_000_000, heading, echo });
+            shield.hear(k, Look { at_ns: now - age * 1_000_000, heading, place: None, echo });
         }
         let footing = Footing { place: None, sigma_m: 0.0, heading };
         let wish = Vector::new(wish.0, wish.1);
@@ -192,7 +218,7 @@ proptest! {
         let speed = v.norm();
         prop_assert!(speed <= wish.norm() + 0.21);
         if speed > 1e-3 {
-            let free = shield.free_way(now, v * (1.0 / speed));
+            let free = shield.free_way(now, v * (1.0 / speed), None);
             prop_assert!(shield.braking().distance(speed) <= free + 1e-3, "{speed} in {free}");
             // Somebody looks there, and not long ago.
             let looked = (0..8).any(|k| {
@@ -209,7 +235,7 @@ proptest! {
         let mut shield = eight();
         shield.set_sweep(f(0));
         for k in 0..20 {
-            shield.hear(k, Look { at_ns: u64::from(bits[1]), heading: f(2), echo: Echo::Range(f(3 + k % 4)) });
+            shield.hear(k, Look { at_ns: u64::from(bits[1]), heading: f(2), place: Vector::new(f(7), f(8)).known(), echo: Echo::Range(f(3 + k % 4)) });
         }
         let footing = Footing { place: Vector::new(f(7), f(8)).known(), sigma_m: f(9), heading: f(2) };
         let walls = DistanceField::new(&door(), 2.0);

@@ -8,6 +8,8 @@ pub struct Hit {
     /// Angle between the ray and the smoothed normal of the surface, 0 (head on) to pi/2 (grazing); 0 for
     /// things without a direction, such as a table leg.
     pub incidence_rad: f32,
+    /// Whether the thing has no direction: a leg, a pole, the end of a wall.
+    pub scatters: bool,
 }
 
 /// What an ultrasonic sensor hears of a plan: the nearest surface inside its cone that faces it.
@@ -22,6 +24,9 @@ pub struct ConeModel {
     pub max_range_m: f32,
     /// A sub-ray that meets its surface at more than this is reflected away, radians.
     pub max_incidence_rad: f32,
+    /// What has no direction (poles, legs, the ends of walls in doorways) scatters to all sides, but only so
+    /// weakly that it is heard up to here, metres.
+    pub scatter_range_m: f32,
 }
 
 impl Default for ConeModel {
@@ -34,6 +39,7 @@ impl Default for ConeModel {
             sub_rays: 31,
             max_range_m: 4.0,
             max_incidence_rad: 12_f32.to_radians(),
+            scatter_range_m: 1.5,
         }
     }
 }
@@ -45,7 +51,9 @@ impl Plan {
     pub fn cast_ray(&self, x: f32, y: f32, angle: f32, max_range: f32) -> Option<Hit> {
         let (sin, cos) = angle.sin_cos();
         let (index, range_m) = self.walk(x, y, cos, sin, max_range)?;
-        Some(Hit { range_m, incidence_rad: self.surfaces().incidence(index, angle) })
+        let surfaces = self.surfaces();
+        let scatters = surfaces.scatters(index);
+        Some(Hit { range_m, incidence_rad: surfaces.incidence(index, angle), scatters })
     }
 
     /// The index of the first occupied cell along a direction of unit length, and its distance.
@@ -146,12 +154,19 @@ pub fn cast_cone(plan: &Plan, model: &ConeModel, x: f32, y: f32, angle: f32) -> 
     model
         .offsets()
         .filter_map(|offset| plan.cast_ray(x, y, angle + offset, model.max_range_m))
-        .filter(|hit| hit.incidence_rad <= model.max_incidence_rad)
+        .filter(|hit| model.hears(hit))
         .map(|hit| hit.range_m)
         .min_by(f32::total_cmp)
 }
 
 impl ConeModel {
+    /// Whether what a sub-ray met sends sound back.
+    #[must_use]
+    pub fn hears(&self, hit: &Hit) -> bool {
+        let reach = if hit.scatters { self.scatter_range_m } else { self.max_range_m };
+        hit.incidence_rad <= self.max_incidence_rad && hit.range_m <= reach
+    }
+
     /// The sub-rays' angles from the axis, from the right edge to the left one.
     pub fn offsets(&self) -> impl Iterator<Item = f32> {
         let (count, half) = (self.sub_rays.max(1), self.half_angle_rad);

@@ -3,7 +3,7 @@ mod batch;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, OnceLock};
 
-use crate::{Cell, ConeModel, Plan};
+use crate::{Cell, ConeModel, Hit, Plan};
 
 /// Headings a turn: one degree is 7 cm across at 4 m, about a cell.
 const HEADINGS: usize = 360;
@@ -158,7 +158,10 @@ impl ConeTable {
         for (k, (ray, (cos, sin))) in rays.iter_mut().zip(&self.directions).enumerate() {
             if let Some((index, range)) = self.plan.walk(x, y, *cos, *sin, self.model.max_range_m) {
                 let angle = std::f32::consts::TAU * k as f32 / HEADINGS as f32;
-                if self.plan.surfaces().incidence(index, angle) <= self.model.max_incidence_rad {
+                let surfaces = self.plan.surfaces();
+                let scatters = surfaces.scatters(index);
+                let incidence_rad = surfaces.incidence(index, angle);
+                if self.model.hears(&Hit { range_m: range, incidence_rad, scatters }) {
                     *ray = 1 + (range / self.level_m).round().min(LEVELS - 1.0) as u8;
                 }
             }

@@ -110,7 +110,8 @@ impl Area {
             Self::Rectangle([ax, ay, bx, by]) => (0.5 * (ax + bx), 0.5 * (ay + by)),
             Self::Polygon(corners) => {
                 let count = corners.len().max(1) as f32;
-                let (x, y) = corners.iter().fold((0.0, 0.0), |sum, corner| (sum.0 + corner.0, sum.1 + corner.1));
+                let (x, y) =
+                    corners.iter().fold((0.0, 0.0), |sum, corner| (sum.0 + corner.0, sum.1 + corner.1));
                 (x / count, y / count)
             }
         }

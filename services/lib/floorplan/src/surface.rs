@@ -39,6 +39,11 @@ impl Surfaces {
         Self { tangent }
     }
 
+    /// Whether the surface at cell `index` has no direction.
+    pub(crate) fn scatters(&self, index: usize) -> bool {
+        self.tangent.get(index).is_none_or(|tangent| *tangent >= INSIDE)
+    }
+
     /// Angle between a ray's direction and the surface's normal at cell `index`, 0..=pi/2.
     pub(crate) fn incidence(&self, index: usize, ray: f32) -> f32 {
         match self.tangent.get(index) {
@@ -99,12 +104,49 @@ impl Raster<'_> {
         }
     }
 
+    /// Whether a cell is part of the end of a wall, as in a doorway: a face so short, between two corners, that
+    /// its direction cannot be told from its cells.
+    fn is_end(&self, x: i32, y: i32, reach: i32) -> bool {
+        // A wall is at most half of the averaging window thick.
+        let longest = (reach / 2).max(2);
+        AXES.iter().any(|(nx, ny)| {
+            // Open towards n; the face runs along t to both sides, and must be closed by a corner at each.
+            let (tx, ty) = (*ny, *nx);
+            if self.occupied(x + nx, y + ny) {
+                return false;
+            }
+            let run = |sign: i32| {
+                (1..=longest).find(|k| {
+                    let (cx, cy) = (x + sign * k * tx, y + sign * k * ty);
+                    !self.occupied(cx, cy)
+                })
+            };
+            let flush = |sign: i32, length: i32| {
+                (1..=length).all(|k| !self.occupied(x + sign * k * tx + nx, y + sign * k * ty + ny))
+            };
+            match (run(1), run(-1)) {
+                (Some(a), Some(b)) => {
+                    a + b - 1 <= longest && flush(1, a) && flush(-1, b) && self.deep(x, y, -nx, -ny, longest)
+                }
+                _ => false,
+            }
+        })
+    }
+
+    /// Whether the wall goes on behind an end: longer than it is thick.
+    fn deep(&self, x: i32, y: i32, dx: i32, dy: i32, length: i32) -> bool {
+        (1..=length).all(|k| self.occupied(x + k * dx, y + k * dy))
+    }
+
     /// Principal direction of the surface cells of the same face around a cell.
     fn tangent(&self, outward: &[Outward], x: i32, y: i32, reach: i32) -> u8 {
         let Some(index) = self.index(x, y) else { return INSIDE };
         let own = outward[index];
         if matches!(own, Outward::None) {
             return INSIDE;
+        }
+        if self.is_end(x, y, reach) {
+            return DIFFUSE;
         }
         let (mut n, mut mx, mut my, mut xx, mut xy, mut yy) = (0.0_f32, 0.0, 0.0, 0.0, 0.0, 0.0);
         for dy in -reach..=reach {
@@ -150,4 +192,5 @@ fn same_face(own: Outward, other: Outward) -> bool {
     }
 }
 
+const AXES: [(i32, i32); 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
 const NEIGHBOURS: [(i32, i32); 8] = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];

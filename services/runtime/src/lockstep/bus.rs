@@ -70,8 +70,7 @@ impl<T: Message> AnyTopic for Topic<T> {
     fn fill_pool(&self) {
         let limits = Limits::of::<T>();
         let readers = self.readers.borrow();
-        let wanted: usize =
-            4 + readers.iter().map(|queue| queue.depth + limits.held.min(2)).sum::<usize>();
+        let wanted: usize = 4 + readers.iter().map(|queue| queue.depth + limits.held.min(2)).sum::<usize>();
         self.pool_size.set(wanted);
         let mut pool = self.pool.borrow_mut();
         pool.reserve(wanted);
@@ -124,8 +123,8 @@ impl Bus {
         let count = self.drawn.get();
         self.drawn.set(count + 1);
         let draw = mix_seed(self.seed, count);
-        let late = if draw.is_multiple_of(LATE_ONE_IN) { (draw >> 40) * DELAY_LATE_NS >> 24 } else { 0 };
-        DELAY_LEAST_NS + ((draw >> 32) * DELAY_SPREAD_NS >> 32) + late
+        let late = if draw.is_multiple_of(LATE_ONE_IN) { ((draw >> 40) * DELAY_LATE_NS) >> 24 } else { 0 };
+        DELAY_LEAST_NS + (((draw >> 32) * DELAY_SPREAD_NS) >> 32) + late
     }
 
     fn topic<T: Message>(&self, name: &str) -> Rc<Topic<T>> {

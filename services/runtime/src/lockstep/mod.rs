@@ -66,7 +66,7 @@ impl Lockstep {
             root: root.to_owned(),
             seed,
             cache,
-            bus: Bus::new(mix_seed(seed, 0x6275_73)),
+            bus: Bus::new(mix_seed(seed, 0x0062_7573)),
             services: Vec::new(),
             tools: Vec::new(),
             incarnations: Vec::new(),
@@ -199,7 +199,10 @@ impl Lockstep {
     /// Messages refused by a service because they made no sense; 0 for one that does not run.
     #[must_use]
     pub fn refused(&self, name: &str) -> u64 {
-        self.services.iter().find(|running| running.name == name).map_or(0, |running| running.service.refused())
+        self.services
+            .iter()
+            .find(|running| running.name == name)
+            .map_or(0, |running| running.service.refused())
     }
 
     /// What a service says of itself.

@@ -152,8 +152,12 @@ impl Holder {
         let mut held: Vec<Box<dyn Any>> = Vec::new();
         let mut kept = Vec::new();
         for topic in manifest.topics() {
-            let unknown = || ShmError(format!("{}: no message type is known for topic {}", manifest.file, topic.name));
-            held.push(visit_topic(&topic.name, &mut CreateTopic { node: &node, name: &topic.name }).ok_or_else(unknown)??);
+            let unknown =
+                || ShmError(format!("{}: no message type is known for topic {}", manifest.file, topic.name));
+            held.push(
+                visit_topic(&topic.name, &mut CreateTopic { node: &node, name: &topic.name })
+                    .ok_or_else(unknown)??,
+            );
         }
         for service in manifest.services.keys() {
             held.push(Box::new(create_event(&node, &wake_name(service))?));
@@ -161,9 +165,14 @@ impl Holder {
         for (service, entry) in &manifest.services {
             for topic in entry.retained() {
                 let keeper = keeper_topic(topic);
-                let unknown = || ShmError(format!("{}: no message type is known for topic {topic}", manifest.file));
-                held.push(visit_topic(topic, &mut CreateTopic { node: &node, name: &keeper }).ok_or_else(unknown)??);
-                let keep = visit_topic(topic, &mut KeepTopic { node: &node, manifest, name: topic }).ok_or_else(unknown)??;
+                let unknown =
+                    || ShmError(format!("{}: no message type is known for topic {topic}", manifest.file));
+                held.push(
+                    visit_topic(topic, &mut CreateTopic { node: &node, name: &keeper })
+                        .ok_or_else(unknown)??,
+                );
+                let keep = visit_topic(topic, &mut KeepTopic { node: &node, manifest, name: topic })
+                    .ok_or_else(unknown)??;
                 kept.push((service.clone(), keep));
             }
         }

@@ -53,8 +53,9 @@ impl RunDir {
     /// moment when it has saved what the keeper needs.
     pub(crate) fn iceoryx_config(&self) -> Result<Config, ShmError> {
         let root = self.shared_root();
-        let root_name = IoxPath::new(root.as_os_str().as_encoded_bytes())
-            .map_err(|_| ShmError(format!("the run directory {} is too long or no path", self.0.display())))?;
+        let root_name = IoxPath::new(root.as_os_str().as_encoded_bytes()).map_err(|_| {
+            ShmError(format!("the run directory {} is too long or no path", self.0.display()))
+        })?;
         let prefix = FileName::new(self.prefix().as_bytes())
             .map_err(|_| ShmError("the shared-memory prefix is no file name".to_owned()))?;
         let mut config = Config::default();

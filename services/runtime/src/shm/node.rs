@@ -6,12 +6,11 @@ use super::ports::{SharedInput, SharedOutput};
 use crate::port::Limits;
 use crate::{StartError, access};
 use iceoryx2::node::{Node, NodeBuilder};
-use iceoryx2::prelude::{
-    AttributeSpecifier, AttributeVerifier, EventId, NodeName, ServiceName, SignalHandlingMode,
-    ipc,
-};
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
+use iceoryx2::prelude::{
+    AttributeSpecifier, AttributeVerifier, EventId, NodeName, ServiceName, SignalHandlingMode, ipc,
+};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use ipc_types::Message;
 use manifest::Manifest;
@@ -83,7 +82,9 @@ fn patiently<T, E: std::fmt::Debug>(
         match attempt() {
             Ok(value) => return Ok(value),
             Err(error) if is_final(&error) || began.elapsed() > OPEN_PATIENCE => {
-                return Err(StartError::SharedMemory(format!("cannot open {what} in shared memory: {error:?}")));
+                return Err(StartError::SharedMemory(format!(
+                    "cannot open {what} in shared memory: {error:?}"
+                )));
             }
             Err(_) => std::thread::sleep(RETRY_PAUSE),
         }
@@ -93,7 +94,8 @@ fn patiently<T, E: std::fmt::Debug>(
 impl SharedNode {
     pub(crate) fn open(name: &str, run_dir: &RunDir, simulated: bool) -> Result<Rc<Self>, StartError> {
         let config = run_dir.iceoryx_config().map_err(|error| StartError::SharedMemory(error.to_string()))?;
-        let node_name = NodeName::new(name).map_err(|_| StartError::SharedMemory(format!("{name} is no name")))?;
+        let node_name =
+            NodeName::new(name).map_err(|_| StartError::SharedMemory(format!("{name} is no name")))?;
         let node = patiently(
             "a node",
             || {
@@ -152,7 +154,8 @@ impl SharedNode {
         manifest: &Manifest,
     ) -> Result<Rc<SharedOutput<T>>, StartError> {
         let factory = self.topic::<T>(name)?;
-        let publisher = patiently(name, || factory.publisher_builder().max_loaned_samples(2).create(), |_| false)?;
+        let publisher =
+            patiently(name, || factory.publisher_builder().max_loaned_samples(2).create(), |_| false)?;
         let mut notifiers = Vec::new();
         for service in access::woken_by(manifest, name) {
             notifiers.push(self.notifier(service)?);
