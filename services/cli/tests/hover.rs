@@ -1,0 +1,67 @@
+//! The system in lockstep: it takes off, stands and lands, and the same seed gives the same flight.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use cli::flight::{Flight, Setup};
+use ipc_types::Verb;
+use std::path::Path;
+
+fn setup(clutter: &str) -> Setup {
+    let deploy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy");
+    let (manifest, root) =
+        runtime::load_manifest(&format!("{0}/system.toml:{0}/sim.toml", deploy.display())).unwrap();
+    Setup {
+        manifest,
+        root,
+        simulator: simulator::Config { clutter: clutter.to_owned(), ..simulator::Config::default() },
+        navigation: None,
+        patience_s: 120.0,
+        cache: runtime::Cache::default(),
+    }
+}
+
+/// Seeds 1 to 3, each with its own mass, motors, level error, compass and gusts. The bounds are three times what
+/// was seen.
+#[test]
+fn it_takes_off_stands_and_lands() {
+    let setup = setup("none");
+    for seed in 1..=3 {
+        let mut flight = Flight::start(&setup, seed).unwrap();
+        flight.run_for(6.0);
+        let pad = flight.world.pad();
+        flight.order(Verb::TakeOff, f32::NAN, f32::NAN);
+        flight.run_for(12.0);
+        for _ in 0..50 {
+            flight.run_for(0.2);
+            let truth = flight.witness.last_truth.unwrap();
+            assert!((truth.z_m - 1.2).abs() < 0.25, "seed {seed}: height {}", truth.z_m);
+            let aside = (truth.x_m - pad.x).hypot(truth.y_m - pad.y);
+            assert!(aside < 0.6, "seed {seed}: {aside} m from the pad");
+        }
+        flight.order(Verb::Land, f32::NAN, f32::NAN);
+        flight.run_for(10.0);
+        assert!(flight.witness.landed(), "seed {seed}: {}", flight.witness.phase());
+        assert_eq!(flight.witness.contacts(), 0, "seed {seed}");
+    }
+}
+
+/// Half a minute of a round in a cluttered building, twice, and with another seed.
+#[test]
+fn the_same_seed_is_the_same_flight_byte_for_byte() {
+    let fly = |seed: u64| {
+        // Nothing is shared between the two flights: a cache filled by the first must not matter.
+        let setup = setup("full");
+        let mut flight = Flight::start(&setup, seed).unwrap();
+        let mut bytes = Vec::new();
+        flight.run_for(6.0);
+        flight.order(Verb::PatrolStart, f32::NAN, f32::NAN);
+        for _ in 0..60 {
+            flight.run_for(0.5);
+            bytes.extend_from_slice(bytemuck::bytes_of(&flight.witness.last_truth.unwrap()));
+            bytes.extend_from_slice(bytemuck::bytes_of(&flight.witness.last_pose.unwrap()));
+        }
+        (bytes, flight.bus.steps())
+    };
+    let first = fly(5);
+    assert!(first == fly(5), "the second flight differs from the first");
+    assert!(first != fly(6));
+}
