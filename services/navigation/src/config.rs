@@ -50,7 +50,7 @@ impl Default for NavigationConfig {
             turn_rad_s: 0.7,
             look_ahead_m: 1.0,
             narrow_m: 0.7,
-            push_m: 0.38,
+            push_m: 0.55,
             push_gain: 0.8,
             stop_gap_m: 0.25,
             wait_s: 4.0,
