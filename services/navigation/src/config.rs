@@ -47,7 +47,7 @@ impl Default for NavigationConfig {
             height_m: 1.2,
             cruise_m_s: 0.0,
             door_m_s: 0.28,
-            turn_rad_s: 0.7,
+            turn_rad_s: 1.0,
             look_ahead_m: 1.0,
             narrow_m: 0.7,
             push_m: 0.55,

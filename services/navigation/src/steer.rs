@@ -47,15 +47,7 @@ const SHORTEST_AHEAD_M: f32 = 0.35;
 /// Places of the route between the drone and its aim that are asked for their clearance.
 const AIM_SAMPLES: usize = 8;
 /// Nearer to the route than this the drone counts as on it, metres.
-const ON_ROUTE_M: f32 = 0.4;
-/// Length of route that its direction is taken from, metres.
-const ONWARD_M: f32 = 0.3;
-/// In narrow places the drone comes back to the line at this rate, 1/s: half of the velocity loop's 2.6, against gusts.
-const BACK_PER_S: f32 = 1.4;
-const BACK_MOST_M_S: f32 = 0.3;
-/// This far aside of the line in a narrow place there is no motion onward, metres: three quarters of the room
-/// beside a disc of 0.45 m in a door of 0.9 m.
-const ASIDE_STOPS_M: f32 = 0.17;
+const ON_ROUTE_M: f32 = 0.25;
 /// Once blocked, the way must be free for this much more, metres.
 const FREE_AGAIN_M: f32 = 0.2;
 /// Less than this much way before the stop is not worth going, metres.
@@ -85,10 +77,6 @@ pub struct Aim {
     pub route_m: f32,
     /// Distance of the drone from the route, metres.
     pub aside_m: f32,
-    /// The place of the route that is nearest to the drone, and one a little further on: its direction.
-    pub foot: (f32, f32),
-    /// See `foot`.
-    pub onward: (f32, f32),
     /// What is left of the route, metres.
     pub remaining_m: f32,
 }
@@ -189,8 +177,6 @@ impl Steering {
                     clearance_m: route.min(line),
                     route_m: route,
                     aside_m: track.aside(),
-                    foot: track.at(track.along()),
-                    onward: track.at(track.along() + ONWARD_M),
                     remaining_m,
                 });
             }
@@ -274,10 +260,7 @@ impl Steering {
         speed *= 1.0 - ((off - TURN_FREE_RAD) / (TURN_FIRST_RAD - TURN_FREE_RAD)).clamp(0.0, 1.0);
         speed = speed.min(self.speed + SPEED_UP_M_S2 * scene.dt_s.clamp(0.0, 0.2));
         self.speed = speed;
-        let mut wish = (speed * direction.cos(), speed * direction.sin());
-        if narrow && !self.blocked {
-            wish = centred(&aim, place, speed, wish);
-        }
+        let wish = (speed * direction.cos(), speed * direction.sin());
         let (velocity, backing) = self.keep_off(config, scene, wish);
         steer.velocity = velocity;
         if backing {
@@ -335,23 +318,6 @@ impl Steering {
         }
         ((vx, vy), backing)
     }
-}
-
-/// In a narrow place: along the line, and back to it. The farther aside, the slower onward: a disc of 0.45 m has
-/// 0.225 m on each side in the middle of a door, and comes to the middle before it goes in.
-fn centred(aim: &Aim, place: &Place, speed: f32, wish: (f32, f32)) -> (f32, f32) {
-    let (tx, ty) = (aim.onward.0 - aim.foot.0, aim.onward.1 - aim.foot.1);
-    let length = tx.hypot(ty);
-    if length < 0.5 * ONWARD_M {
-        return wish;
-    }
-    let (tx, ty) = (tx / length, ty / length);
-    let (ox, oy) = (aim.foot.0 - place.x, aim.foot.1 - place.y);
-    // Only across: what lies along the line is progress, not error.
-    let across = ox * -ty + oy * tx;
-    let back = (BACK_PER_S * across).clamp(-BACK_MOST_M_S, BACK_MOST_M_S);
-    let onward = speed * (1.0 - across.abs() / ASIDE_STOPS_M).max(0.0);
-    (onward * tx - back * ty, onward * ty + back * tx)
 }
 
 fn reason_of(reason: Reason) -> SteeringReason {
