@@ -1,5 +1,7 @@
 //! What the tests of the whole system share.
 
+pub mod counting;
+
 use std::path::Path;
 
 /// The root of the checkout that these tests belong to.

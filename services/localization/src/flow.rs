@@ -55,15 +55,17 @@ impl Flows {
     }
 
     /// Forgets the newest frame when it is too far from the velocity expected in the body frame; unless
-    /// that has happened too often in a row.
-    pub(crate) fn gate(&mut self, expected: [f32; 2]) {
-        let Some(newest) = self.waiting().last() else { return };
+    /// that has happened too often in a row. The frame, when it stays.
+    pub(crate) fn gate(&mut self, expected: [f32; 2]) -> Option<Frame> {
+        let newest = *self.waiting().last()?;
         let miss = (newest.velocity[0] - expected[0]).hypot(newest.velocity[1] - expected[1]);
         if miss > GATE_M_S + 4.0 * newest.sigma && self.outside < INSISTENT {
             self.outside += 1;
             self.count -= 1;
+            None
         } else {
             self.outside = 0;
+            Some(newest)
         }
     }
 

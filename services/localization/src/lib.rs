@@ -13,6 +13,7 @@ mod service;
 mod set;
 mod start;
 mod sweep;
+mod velocity;
 
 pub use attitude::{Attitudes, Mean};
 pub use config::{

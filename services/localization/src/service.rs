@@ -8,6 +8,7 @@ use crate::predict::{Dynamics, predict};
 use crate::set::{MEMORY_GROUNDED, Set, columns, columns_mut, fold};
 use crate::start::{Place, place};
 use crate::sweep::{Group, Waiting};
+use crate::velocity::{Frames, Velocity};
 use floorplan::{ConeModel, ConeTable};
 use ipc_types::{
     Attitude, FlowMotion, LocalizationState, MAX_PARTICLES, Particles, PilotState, Pose, SonarRanges, Text,
@@ -49,6 +50,7 @@ pub struct Localization {
 
     attitudes: Attitudes,
     flows: Flows,
+    velocity: Velocity,
     waiting: Waiting,
     walls: Walls,
     set: Set,
@@ -100,6 +102,7 @@ impl Service for Localization {
             seed: start.seed,
             attitudes: Attitudes::default(),
             flows: Flows::default(),
+            velocity: Velocity::default(),
             waiting: Waiting::default(),
             walls: Walls::default(),
             set: Set::None,
@@ -193,11 +196,13 @@ impl Localization {
                 self.refused += 1;
                 continue;
             }
-            if let Some(b) = &self.believed {
-                let p = self.predicted(b, frame.sampled_ns, false);
+            if let Some(b) = self.believed {
+                let p = self.predicted(&b, frame.sampled_ns, false);
                 let (sin, cos) = p.heading.sin_cos();
                 let [x, y] = p.velocity;
-                self.flows.gate([cos * x + sin * y, -sin * x + cos * y]);
+                if let Some(frame) = self.flows.gate([cos * x + sin * y, -sin * x + cos * y]) {
+                    self.velocity.flow(&frame, &self.attitudes, &self.frames(&b));
+                }
             }
         }
         while let Some(message) = self.ranges.receive() {
@@ -330,7 +335,13 @@ impl Localization {
         loan.send();
         self.sent += 1;
         self.sent_ns = now;
-        self.believed = Some(Believed { time_ns, estimate: update.estimate, count: update.count });
+        let believed = Believed { time_ns, estimate: update.estimate, count: update.count };
+        let (e, frames) = (&believed.estimate, self.frames(&believed));
+        if group.is_some() {
+            let (place, velocity) = ([e.x, e.y], [e.velocity_x, e.velocity_y]);
+            self.velocity.place(time_ns, place, velocity, &self.attitudes, &frames);
+        }
+        self.believed = Some(believed);
     }
 
     fn remember(&self, memory: &Memory) -> [f32; 16] {
@@ -339,11 +350,20 @@ impl Localization {
         out
     }
 
+    fn frames(&self, b: &Believed) -> Frames {
+        let e = &b.estimate;
+        let level = [e.level_roll, e.level_pitch];
+        Frames { heading_offset: e.heading_offset, level, drag: self.config.motion.drag }
+    }
+
     fn predicted(&self, b: &Believed, to_ns: u64, with_flow: bool) -> crate::predict::Predicted {
         let motion = &self.config.motion;
         let dynamics = Dynamics { drag: motion.drag, velocity_noise: motion.velocity_noise };
         let flows = if with_flow { self.flows.waiting() } else { &[] };
         let mut p = predict(&b.estimate, dynamics, b.time_ns, to_ns, &self.attitudes, flows);
+        if let Some((velocity, sigma)) = self.velocity.at(to_ns, &self.attitudes, &self.frames(b)) {
+            (p.velocity, p.velocity_sigma) = (velocity, sigma);
+        }
         if self.grounded {
             p.position = [b.estimate.x, b.estimate.y];
             p.velocity = [0.0; 2];

@@ -15,14 +15,15 @@ pub struct NavigationConfig {
     pub door_m_s: f32,
     /// Fastest turn of the wished heading, radians a second.
     pub turn_rad_s: f32,
+    /// The heading sweeps to either side by this, degrees, in this time there and back, seconds: eight cones leave
+    /// gaps between them that are to be looked into.
+    pub scan_deg: f32,
+    /// See `scan_deg`.
+    pub scan_s: f32,
     /// How far ahead on the route the drone aims, metres.
     pub look_ahead_m: f32,
     /// Clearance of the plan below which the planned path is followed rather than a valley, metres.
     pub narrow_m: f32,
-    /// A side sonar that sees something nearer than this to the drone's middle pushes it away, metres.
-    pub push_m: f32,
-    /// How fast it pushes, metres a second for each metre too near.
-    pub push_gain: f32,
     /// Free way kept between the airframe and what stands ahead, metres.
     pub stop_gap_m: f32,
     /// How long to wait for what blocks the way to move on, seconds.
@@ -48,10 +49,10 @@ impl Default for NavigationConfig {
             cruise_m_s: 0.0,
             door_m_s: 0.28,
             turn_rad_s: 1.0,
+            scan_deg: 12.0,
+            scan_s: 2.4,
             look_ahead_m: 1.0,
             narrow_m: 0.7,
-            push_m: 0.55,
-            push_gain: 0.8,
             stop_gap_m: 0.25,
             wait_s: 4.0,
             stuck_s: 12.0,
@@ -75,10 +76,10 @@ impl Validate for NavigationConfig {
         }
         check("door_m_s", self.door_m_s, 0.05, 1.0)?;
         check("turn_rad_s", self.turn_rad_s, 0.1, 2.0)?;
+        check("scan_deg", self.scan_deg, 0.0, 30.0)?;
+        check("scan_s", self.scan_s, 1.0, 20.0)?;
         check("look_ahead_m", self.look_ahead_m, 0.4, 1.5)?;
         check("narrow_m", self.narrow_m, 0.0, 2.0)?;
-        check("push_m", self.push_m, 0.0, 1.0)?;
-        check("push_gain", self.push_gain, 0.0, 3.0)?;
         check("stop_gap_m", self.stop_gap_m, 0.1, 1.0)?;
         check("wait_s", self.wait_s, 0.0, 60.0)?;
         check("stuck_s", self.stuck_s, 3.0, 120.0)?;

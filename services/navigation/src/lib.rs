@@ -6,6 +6,7 @@
 //!
 //! - [`place`], [`senses`]: what is believed of poses and echoes
 //! - [`track`], [`steer`]: following a planned line and giving way
+//! - [`fence`]: the speed towards what is near
 //! - [`blockage`]: when a way counts as blocked
 //! - [`mission`]: commands, phases of the pilot, the pad
 //! - [`journey`]: planning in slices, what was seen, what is left out and why; survives a restart
@@ -19,6 +20,7 @@ pub mod atlas;
 pub mod blockage;
 pub mod config;
 pub mod core;
+pub mod fence;
 pub mod journey;
 pub mod mission;
 mod obstruct;

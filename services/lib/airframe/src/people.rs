@@ -58,6 +58,12 @@ impl Person {
         (self.x, self.y)
     }
 
+    /// Whether the person has a step to make now, rather than standing.
+    #[must_use]
+    pub fn walks(&self) -> bool {
+        self.standing <= 0.0 && self.waited <= 0.0 && self.way.len() > 1
+    }
+
     /// The person as a solid: a coat, and soft.
     #[must_use]
     pub fn solid(&self) -> Solid {

@@ -98,7 +98,8 @@ pub const UNITS_PER_READING: u8 = 8;
 
 impl Default for GridRules {
     /// The `flight` configuration: six readings saturate, so that what moved on is cleared by a handful of
-    /// pings (about 2 s at 4 Hz a sensor); a full cell is forgotten in 12 s; an echo from behind takes three
+    /// pings (about 2 s at 4 Hz a sensor); a full cell is forgotten in 32 s, because who stands between two cones
+    /// is heard by neither; an echo from behind takes three
     /// quarters of a reading away.
     fn default() -> Self {
         Self {
@@ -106,7 +107,7 @@ impl Default for GridRules {
             most: 6 * UNITS_PER_READING,
             clear_echo: 6,
             clear_silence: 1,
-            decay_per_s: 4.0,
+            decay_per_s: 1.5,
             clear_margin_m: 0.15,
             clear_half_angle_rad: 7.5 / 180.0 * PI,
         }

@@ -8,13 +8,16 @@ use crate::planar::Vector;
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct VelocityConfig {
-    /// Acceleration for each m/s of error, 1/s. The tilt answers in 0.15-0.2 s behind about 0.1 s of link and
-    /// localization: 2.6 leaves 45 degrees of phase and a factor of 1.8 in gain. Less lets gusts of
-    /// 0.3 m/s2, which blow near walls, make it miss the wished velocity by 0.2 m/s.
+    /// Acceleration for each m/s of error, 1/s. The tilt answers in 0.15 s behind about 0.1 s of link and
+    /// localization; less gain lets gusts of 0.3 m/s2, which blow near walls, make it miss the wished velocity by
+    /// 0.2 m/s.
     pub gain_per_s: f32,
-    /// Growth of the disturbance estimate for each m/s of error, 1/s2: a third of the gain as a rate;
-    /// 1.5 degrees of level error are trimmed out in 3 s.
+    /// Growth of the disturbance estimate for each m/s of error, 1/s2. The integral of the velocity error is
+    /// the way that a gust has carried the body off: it is flown back.
     pub integral_per_s2: f32,
+    /// Time in which the velocity follows the reference when nothing disturbs, seconds: the error is taken
+    /// against what could have been reached, so that the integral learns no lag.
+    pub response_s: f32,
     /// Most disturbance that is believed, m/s2: 5 degrees of level error or a strong draught.
     pub max_disturbance_m_s2: f32,
     /// Most tilt from level, degrees: FACTS 1 asks to stay under about 10, where the controller's attitude
@@ -24,7 +27,7 @@ pub struct VelocityConfig {
     pub max_tilt_rate_deg_s: f32,
     /// Growth of the wished speed, m/s2.
     pub acceleration_m_s2: f32,
-    /// Fall of the wished speed, m/s2: what 10 degrees of tilt give with some in hand.
+    /// Fall of the wished speed, m/s2: more than 10 degrees of tilt give: nothing holds it back.
     pub braking_m_s2: f32,
     /// Share of the change of the wished speed that goes straight to the tilt.
     pub feed_forward: f32,
@@ -33,14 +36,15 @@ pub struct VelocityConfig {
 impl Default for VelocityConfig {
     fn default() -> Self {
         Self {
-            gain_per_s: 2.6,
-            integral_per_s2: 0.9,
+            gain_per_s: 4.0,
+            integral_per_s2: 3.0,
+            response_s: 0.2,
             max_disturbance_m_s2: 0.8,
             max_tilt_deg: 10.0,
-            max_tilt_rate_deg_s: 60.0,
+            max_tilt_rate_deg_s: 150.0,
             acceleration_m_s2: 0.8,
-            braking_m_s2: 1.5,
-            feed_forward: 0.6,
+            braking_m_s2: 2.5,
+            feed_forward: 1.0,
         }
     }
 }
@@ -49,13 +53,14 @@ impl VelocityConfig {
     /// # Errors
     /// When a value is outside its bounds.
     pub fn validate(&self) -> Result<(), RangeError> {
-        within("velocity.gain_per_s", self.gain_per_s, 0.3, 4.0)?;
-        within("velocity.integral_per_s2", self.integral_per_s2, 0.0, 1.5)?;
+        within("velocity.gain_per_s", self.gain_per_s, 0.3, 8.0)?;
+        within("velocity.integral_per_s2", self.integral_per_s2, 0.0, 12.0)?;
+        within("velocity.response_s", self.response_s, 0.02, 0.5)?;
         within("velocity.max_disturbance_m_s2", self.max_disturbance_m_s2, 0.0, 1.5)?;
         within("velocity.max_tilt_deg", self.max_tilt_deg, 3.0, 15.0)?;
         within("velocity.max_tilt_rate_deg_s", self.max_tilt_rate_deg_s, 10.0, 200.0)?;
         within("velocity.acceleration_m_s2", self.acceleration_m_s2, 0.2, 2.0)?;
-        within("velocity.braking_m_s2", self.braking_m_s2, 0.3, 2.5)?;
+        within("velocity.braking_m_s2", self.braking_m_s2, 0.3, 4.0)?;
         within("velocity.feed_forward", self.feed_forward, 0.0, 1.0)
     }
 }
@@ -96,16 +101,15 @@ impl Tilt {
     }
 }
 
-/// A reference so near the wish has arrived, m/s.
-const SETTLED_M_S: f32 = 0.05;
-
-/// The controller: proportional on velocity, an estimate of the steady disturbance, feed-forward of the
-/// wished change.
+/// The controller: proportional and integral on what the velocity misses of a reference model, feed-forward
+/// of the wished change.
 #[derive(Clone, Debug)]
 pub struct VelocityController {
     config: VelocityConfig,
     drag_per_s: f32,
     reference: Vector,
+    /// The reference as the body can follow it.
+    expected: Vector,
     compensation: Vector,
     tilt: Tilt,
 }
@@ -119,6 +123,7 @@ impl VelocityController {
             config,
             drag_per_s,
             reference: Vector::ZERO,
+            expected: Vector::ZERO,
             compensation: Vector::ZERO,
             tilt: Tilt::default(),
         }
@@ -145,6 +150,7 @@ impl VelocityController {
     /// Starts from a velocity that is flown already, so that nothing jumps.
     pub fn set_reference(&mut self, velocity: Vector) {
         self.reference = velocity.known().unwrap_or(Vector::ZERO);
+        self.expected = self.reference;
     }
 
     /// The tilt, from level, for the next step: `wish` and `velocity` in the plan frame, `heading` of the
@@ -168,20 +174,19 @@ impl VelocityController {
                 let rate = if wish.norm() < before.norm() { c.braking_m_s2 } else { c.acceleration_m_s2 };
                 self.reference = before.approached(wish, rate * dt);
                 let change = (self.reference - before) * (c.feed_forward / dt.max(1e-3));
-                let error = self.reference - velocity;
+                self.expected += (self.reference - self.expected) * (dt / c.response_s).min(1.0);
+                let error = self.expected - velocity;
                 let drag = self.reference * self.drag_per_s;
                 let wanted = error * c.gain_per_s + change + drag + self.compensation;
                 let saturated = wanted.norm() > GRAVITY_M_S2 * most.tan();
                 if !saturated || error.dot(self.compensation) < 0.0 {
-                    // While the wish changes the error is mostly the lag of the body, not a disturbance.
-                    let share = if (wish - before).norm() > SETTLED_M_S { 0.2 } else { 1.0 };
-                    let grown = self.compensation + error * (share * c.integral_per_s2 * dt);
+                    let grown = self.compensation + error * (c.integral_per_s2 * dt);
                     self.compensation = grown.limited(c.max_disturbance_m_s2);
                 }
                 wanted
             }
             None => {
-                self.reference = Vector::ZERO;
+                (self.reference, self.expected) = (Vector::ZERO, Vector::ZERO);
                 self.compensation
             }
         };

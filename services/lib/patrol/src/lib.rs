@@ -9,6 +9,7 @@
 mod costmap;
 mod cover;
 mod fan;
+mod gates;
 mod limits;
 mod obstacle;
 mod raster;

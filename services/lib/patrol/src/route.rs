@@ -1,3 +1,4 @@
+use crate::gates::straightened;
 use crate::search::Search;
 use crate::smooth::Smoother;
 use crate::{Costmap, Obstacle};
@@ -171,7 +172,7 @@ impl RoutePlanner {
     }
 
     fn finish(&mut self, map: &Costmap) {
-        let points = self.smoother.take();
+        let points = straightened(map, self.smoother.take());
         let pieces = points.windows(2);
         let length_m = pieces.map(|p| (p[0].0 - p[1].0).hypot(p[0].1 - p[1].1)).sum();
         let clearance_m = points

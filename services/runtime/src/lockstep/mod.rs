@@ -55,6 +55,7 @@ pub struct Lockstep {
     now: u64,
     ticks: u64,
     steps: u64,
+    watch: fn(Option<&'static str>),
 }
 
 impl Lockstep {
@@ -73,7 +74,15 @@ impl Lockstep {
             now: 0,
             ticks: 0,
             steps: 0,
+            watch: |_| {},
         }
+    }
+
+    /// Has `watch` called with a service's name just before each of its steps and with `None` just after, for
+    /// tests that ask what a step does to the process. It is shown no service and no message, so that nothing
+    /// measured can change a flight.
+    pub fn watch_steps(&mut self, watch: fn(Option<&'static str>)) {
+        self.watch = watch;
     }
 
     /// The simulated clock, nanoseconds.
@@ -254,7 +263,9 @@ impl Lockstep {
             running.next_tick = raster + lateness.min(running.period_ns / 4);
         }
         running.context.now.set(self.now);
+        (self.watch)(Some(running.name));
         running.service.step(self.now);
+        (self.watch)(None);
         self.steps += 1;
         for running in &mut self.services {
             running.next_wake = self.bus.next_wake(running.name, self.now);

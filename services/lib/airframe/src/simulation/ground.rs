@@ -39,7 +39,7 @@ impl GroundWatch {
             self.soft = self.carpets.iter().any(|carpet| carpet.outline_distance(x, y) <= 0.0);
             self.moving = world.people().people().iter().any(|person| {
                 let solid = person.solid();
-                (solid.x - x).hypot(solid.y - y) < PERSON_M
+                person.walks() && (solid.x - x).hypot(solid.y - y) < PERSON_M
             });
         }
     }

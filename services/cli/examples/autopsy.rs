@@ -1,0 +1,203 @@
+//! Flies rounds in lockstep and prints, for each that touched something, its last seconds: what was touched,
+//! and ten times a second the gap, the speeds towards it (wished by navigation, allowed by the shield's
+//! channels, believed, true) and what steering said.
+//!
+//! `cargo run --release -p cli --example autopsy -- FIRST LAST CLUTTER VEHICLE [LINES] [DEPLOY]`
+#![allow(clippy::print_stdout, reason = "printing is what it is for")]
+
+use anyhow::Result;
+use cli::flight::{Flight, Setup};
+use ipc_types::{
+    Channels, FlowMotion, Phase, PilotState, Polar, Pose, Setpoint, SteeringReason, Truth, Verb,
+};
+use std::collections::VecDeque;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+#[derive(Clone, Copy)]
+struct Line {
+    truth: Truth,
+    pose: Pose,
+    setpoint: Setpoint,
+    polar: Polar,
+    channels: Channels,
+    pilot: PilotState,
+    flow: FlowMotion,
+    off_m: f32,
+}
+
+fn main() -> Result<()> {
+    let mut words = std::env::args().skip(1);
+    let first: u64 = words.next().map_or(Ok(1), |word| word.parse())?;
+    let last: u64 = words.next().map_or(Ok(20), |word| word.parse())?;
+    let clutter = words.next().unwrap_or_else(|| "full".to_owned());
+    let vehicle = words.next().unwrap_or_else(|| "watchman".to_owned());
+    let lines: usize = words.next().map_or(Ok(25), |word| word.parse())?;
+    let deploy =
+        words.next().map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy"), Into::into);
+    let files = format!("{0}/system.toml:{0}/sim.toml", deploy.display());
+    let (mut manifest, root) = runtime::load_manifest(&files)?;
+    manifest.system.vehicle = format!("vehicles/{vehicle}.toml");
+    let setup = Setup {
+        manifest,
+        root,
+        simulator: simulator::Config { clutter, ..simulator::Config::default() },
+        navigation: None,
+        patience_s: 1500.0,
+        cache: runtime::Cache::default(),
+    };
+    let next = AtomicU64::new(first);
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let told = std::sync::Mutex::new(Vec::<(u64, String)>::new());
+    std::thread::scope(|scope| {
+        for _ in 0..cores {
+            scope.spawn(|| {
+                loop {
+                    let seed = next.fetch_add(1, Ordering::Relaxed);
+                    if seed > last {
+                        break;
+                    }
+                    let text = fly(&setup, seed, lines).unwrap_or_else(|error| format!("{error:#}"));
+                    told.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((seed, text));
+                }
+            });
+        }
+    });
+    let mut told = told.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    told.sort();
+    for (seed, text) in told {
+        println!("== seed {seed}: {text}");
+    }
+    Ok(())
+}
+
+fn fly(setup: &Setup, seed: u64, keep: usize) -> Result<String> {
+    let mut flight = Flight::start(setup, seed)?;
+    let mut ports = flight.bus.tool("cli");
+    let mut setpoints = ports.input::<Setpoint>(16)?;
+    let mut poses = ports.input::<Pose>(16)?;
+    let mut polars = ports.input::<Polar>(2)?;
+    let mut channels = ports.input::<Channels>(16)?;
+    let mut flows = ports.input::<FlowMotion>(16)?;
+    let mut kept: VecDeque<Line> = VecDeque::new();
+    let mut line: Line = Line {
+        truth: Truth::default(),
+        pose: Pose::default(),
+        setpoint: Setpoint::default(),
+        polar: Polar::default(),
+        channels: Channels::default(),
+        pilot: PilotState::default(),
+        flow: FlowMotion::default(),
+        off_m: f32::NAN,
+    };
+    flight.run_for(6.0);
+    flight.order(Verb::PatrolStart, f32::NAN, f32::NAN);
+    let mut hovers = String::new();
+    let mut cause = 0;
+    while (flight.bus.now() as f64 * 1e-9) < setup.patience_s {
+        flight.run_for(0.1);
+        let Some(truth) = flight.witness.last_truth else { continue };
+        line.truth = truth;
+        line.pose = poses.latest().map_or(line.pose, |new| *new);
+        line.setpoint = setpoints.latest().map_or(line.setpoint, |new| *new);
+        line.flow = flows.latest().map_or(line.flow, |new| *new);
+        line.polar = polars.latest().map_or(line.polar, |new| *new);
+        line.channels = channels.latest().map_or(line.channels, |new| *new);
+        line.pilot = flight.witness.last_pilot.unwrap_or_default();
+        line.off_m = flight.witness.error_m().unwrap_or(f32::NAN);
+        if kept.len() == keep {
+            kept.pop_front();
+        }
+        kept.push_back(line);
+        if let Some(PilotState { cause: now, text, .. }) = flight.witness.last_pilot
+            && now != cause
+        {
+            cause = now;
+            write!(hovers, " [{:.0} s {:.1} {:.1}: {text}]", truth.time_s, truth.x_m, truth.y_m)?;
+        }
+        if flight.witness.contacts() > 0 || flight.witness.landed() {
+            break;
+        }
+    }
+    let truth = line.truth;
+    let phase = flight.witness.last_pilot.and_then(|pilot| Phase::from_code(pilot.phase));
+    let mut out = String::new();
+    write!(
+        out,
+        "{:.0} s, {} contacts, least gap {:.2}, phase {phase:?}",
+        truth.time_s, truth.contacts, truth.min_clearance_m
+    )?;
+    write!(out, ", {}{hovers}", flight.witness.round.text)?;
+    if truth.contacts == 0 {
+        return Ok(out);
+    }
+    let (name, bearing) = touched(&flight, &truth);
+    write!(
+        out,
+        "\n   touched {name} at {:.2} {:.2}, bearing {:.0} deg",
+        truth.x_m,
+        truth.y_m,
+        bearing.to_degrees()
+    )?;
+    let towards = |x: f32, y: f32| x * bearing.cos() + y * bearing.sin();
+    for line in kept {
+        let t = line.truth;
+        write!(
+            out,
+            "\n   {:6.1} at {:6.2} {:6.2} {:4.2} yaw {:4.0} gap {:5.2} | to it: wish {:5.2} believed {:5.2} true {:5.2} | speeds wish {:4.2} shield {:4.2} true {:4.2} {:5.2} | tilt {:4.1} {:4.1} sp {} {} src {} {:?} dir {:4.0} target {:4.0} | off {:.2} sigma {:.2} p {:.2} | flow {} thr {} h {:.2}",
+            t.time_s,
+            t.x_m,
+            t.y_m,
+            t.z_m,
+            t.yaw_rad.to_degrees(),
+            t.clearance_m,
+            towards(line.setpoint.velocity_x_m_s, line.setpoint.velocity_y_m_s),
+            towards(line.pose.velocity_x_m_s, line.pose.velocity_y_m_s),
+            towards(t.velocity_x_m_s, t.velocity_y_m_s),
+            line.setpoint.velocity_x_m_s.hypot(line.setpoint.velocity_y_m_s),
+            line.pilot.shield_speed_m_s,
+            t.velocity_x_m_s.hypot(t.velocity_y_m_s),
+            t.velocity_z_m_s,
+            t.roll_rad.to_degrees(),
+            t.pitch_rad.to_degrees(),
+            line.setpoint.kind,
+            if line.setpoint.hold_x_m.is_finite() { "hold" } else { "go" },
+            line.channels.source,
+            SteeringReason::from_code(line.polar.reason),
+            line.polar.chosen_rad.to_degrees(),
+            line.polar.target_rad.to_degrees(),
+            line.off_m,
+            line.pose.sigma_m(),
+            line.pose.p_lost,
+            line.flow.quality,
+            line.channels.channels_us[2],
+            line.pilot.height_m,
+        )?;
+    }
+    Ok(out)
+}
+
+/// What was touched and in which direction of the plan frame it lies.
+fn touched(flight: &Flight, truth: &Truth) -> (String, f32) {
+    let people = truth.people.iter().take(truth.people_used as usize);
+    let person = people
+        .map(|person| (person.x_m - truth.x_m, person.y_m - truth.y_m))
+        .min_by(|a, b| a.0.hypot(a.1).total_cmp(&b.0.hypot(b.1)));
+    if let Some((dx, dy)) = person
+        && dx.hypot(dy) < 0.6
+    {
+        return ("a person".to_owned(), dy.atan2(dx));
+    }
+    let at = |x: f32, y: f32| flight.world.nearest(x, y, truth.z_m, 0.16, 0.225);
+    let here = at(truth.x_m, truth.y_m);
+    let (mut best, mut bearing) = (f32::INFINITY, 0.0);
+    for i in 0..72 {
+        let angle = (i as f32) * core::f32::consts::TAU / 72.0;
+        let there = at(truth.x_m + 0.05 * angle.cos(), truth.y_m + 0.05 * angle.sin());
+        if there.clearance < best {
+            (best, bearing) = (there.clearance, angle);
+        }
+    }
+    (here.name.to_owned(), bearing)
+}

@@ -1,0 +1,110 @@
+//! Speed towards what is near: the nearer, the slower, and away from what is too near.
+//!
+//! Twenty-four directions around the drone, in each the nearest of what the sonars have seen and the plan
+//! knows. In each the velocity's part towards it may be no more than `GAIN_PER_S * (gap - KEEP_M)`: the speed falls with
+//! the gap in a time that the velocity loop can follow, and a gust that carries the drone nearer than
+//! [`KEEP_M`] is answered by a motion away. The shield of the pilot knows nothing of the grid: it is the second
+//! opinion.
+
+use crate::steer::{STANDS_CERTAINTY, Scene};
+use avoid::SIDE;
+use core::f32::consts::TAU;
+
+/// Directions: 15 degrees apart, so that a wall looked at aslant is at most 1 % farther than it is.
+const DIRECTIONS: usize = 24;
+/// What is farther than this matters to the histogram only, metres from the drone's middle.
+const REACH_M: f32 = 1.0;
+/// Speed for each metre of gap, 1/s: half of what the velocity loop follows (its answer takes 0.4 s).
+const GAIN_PER_S: f32 = 1.2;
+/// Gap that is kept, metres: a gust of 0.3 m/s2 carries the drone 5 cm before it is flown back.
+const KEEP_M: f32 = 0.11;
+/// Fastest motion away, metres a second.
+const AWAY_M_S: f32 = 0.2;
+/// Passes over the directions; two opposite ones that are too near settle in the middle.
+const PASSES: usize = 6;
+/// Echoes older than this say nothing about now, seconds: a sweep of eight one by one is 0.48 s.
+const ECHO_AGE_S: f32 = 0.5;
+
+/// Gaps around the airframe.
+#[derive(Clone, Copy, Debug)]
+pub struct Fence {
+    /// Unit vectors, plan frame, and the gap between airframe and what is nearest there, metres.
+    sides: [(f32, f32, f32); DIRECTIONS],
+    least_m: f32,
+}
+
+impl Fence {
+    /// Looks around.
+    #[must_use]
+    pub fn around(scene: &Scene<'_>, radius_m: f32) -> Self {
+        let mut nearest = [f32::INFINITY; DIRECTIONS];
+        let mut note = |angle: f32, distance: f32| {
+            if angle.is_finite() && distance < REACH_M {
+                let side = (angle / TAU * DIRECTIONS as f32).round() as i32;
+                if let Some(slot) = nearest.get_mut(side.rem_euclid(DIRECTIONS as i32) as usize) {
+                    *slot = slot.min(distance);
+                }
+            }
+        };
+        let (x, y) = (scene.place.x, scene.place.y);
+        if let Some(middle) = scene.window.index(x, y) {
+            let (row, column) = ((middle / SIDE) as i32, (middle % SIDE) as i32);
+            let reach = (REACH_M / avoid::CELL_M) as i32;
+            let within = |middle: i32| (middle - reach).max(0)..(middle + reach + 1).min(SIDE as i32);
+            for index in
+                within(row).flat_map(|row| within(column).map(move |c| row as usize * SIDE + c as usize))
+            {
+                if scene.cells.get(index).is_some_and(|cell| *cell >= STANDS_CERTAINTY) {
+                    let (cx, cy) = scene.window.centre(index);
+                    note((cy - y).atan2(cx - x), (cx - x).hypot(cy - y));
+                }
+            }
+        }
+        for (bearing, distance) in scene.senses.near(scene.now, ECHO_AGE_S) {
+            note(scene.place.heading + bearing, distance);
+        }
+        let mut sides = [(0.0, 0.0, f32::INFINITY); DIRECTIONS];
+        for (i, (side, seen)) in sides.iter_mut().zip(nearest).enumerate() {
+            let (sin, cos) = (i as f32 * TAU / DIRECTIONS as f32).sin_cos();
+            *side = (cos, sin, seen.min(wall(scene, cos, sin)) - radius_m);
+        }
+        let least_m = sides.iter().fold(f32::INFINITY, |least, side| least.min(side.2));
+        Self { sides, least_m }
+    }
+
+    /// The least gap, metres; infinite when nothing is near.
+    #[must_use]
+    pub fn least_m(&self) -> f32 {
+        self.least_m
+    }
+
+    /// What is left of a wish, plan frame, and whether something is nearer than is kept.
+    #[must_use]
+    pub fn keep(&self, wish: (f32, f32)) -> ((f32, f32), bool) {
+        let (mut vx, mut vy) = wish;
+        for _ in 0..PASSES {
+            for (ux, uy, gap) in self.sides.iter().filter(|side| side.2.is_finite()) {
+                let most = (GAIN_PER_S * (gap - KEEP_M)).max(-AWAY_M_S);
+                let excess = vx * ux + vy * uy - most;
+                if excess > 0.0 {
+                    (vx, vy) = (vx - excess * ux, vy - excess * uy);
+                }
+            }
+        }
+        ((vx, vy), self.least_m < KEEP_M)
+    }
+}
+
+/// Distance to what the plan knows in a direction, metres, by steps that the distance field allows.
+fn wall(scene: &Scene<'_>, ux: f32, uy: f32) -> f32 {
+    let mut way = 0.0;
+    // Each step is at least 2 cm: bounded by a metre's worth of them.
+    while way < REACH_M {
+        let free = scene.field.distance(scene.place.x + way * ux, scene.place.y + way * uy);
+        if free < 0.02 {
+            return way;
+        }
+        way += free.max(0.02);
+    }
+    f32::INFINITY
+}

@@ -1,0 +1,239 @@
+//! From `sonar/ranges` to the `pilot/channels` made from it, between real processes on shared memory, in flight.
+//!
+//! Starts the simulated system as `sereno up --sim` does, flies a round and reads the step journals: which step of
+//! whom took which message, and when it began. What is left of the way without the steps themselves and without
+//! the waiting for the pilot's tick is what shared memory, wake-ups and the scheduler cost.
+//!
+//! Needs the programs beside it: `cargo build --release --workspace --bins`, then
+//! `cargo bench -p sereno-tests --bench sonar_to_channels`. `SERENO_BENCH_SECONDS` changes the length (60).
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "measurements")]
+
+use cli::place::Place;
+use ipc_types::{Channels, Health, Message, Phase, PilotState, SonarRanges, Trace};
+use runtime::{Input, Tool};
+use sereno_tests::checkout;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// All is up, armed and climbing within this time.
+const PATIENCE: Duration = Duration::from_secs(90);
+/// Sixteen messages wait in an input: of the fastest journal (250 a second) those of 64 ms.
+const GLANCE: Duration = Duration::from_millis(2);
+/// The pilot's period: nothing wakes it.
+const TICK_NS: u64 = 20_000_000;
+
+/// The supervised system; stopped when this goes out of scope.
+struct System {
+    sereno: PathBuf,
+    run_dir: tempfile::TempDir,
+    up: Child,
+}
+
+impl System {
+    fn command(sereno: &Path, run_dir: &Path) -> Command {
+        let mut command = Command::new(sereno);
+        command.arg("--deploy").arg(checkout().join("deploy")).arg("--run-dir").arg(run_dir);
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command
+    }
+
+    fn start(sereno: &Path) -> Self {
+        let run_dir = tempfile::tempdir().unwrap();
+        let up = Self::command(sereno, run_dir.path()).args(["up", "--sim", "--quiet"]).spawn().unwrap();
+        Self { sereno: sereno.to_owned(), run_dir, up }
+    }
+
+    fn order(&self, words: &[&str]) -> bool {
+        Self::command(&self.sereno, self.run_dir.path()).args(words).status().unwrap().success()
+    }
+
+    fn join(&self) -> Option<Tool> {
+        let place = Place { deploy: None, run_dir: Some(self.run_dir.path().to_owned()) };
+        let (manifest, _, run_dir) = place.running().ok()?;
+        Tool::join("cli", manifest, &run_dir).ok()
+    }
+}
+
+impl Drop for System {
+    fn drop(&mut self) {
+        if !self.order(&["down", "--now"]) {
+            let _ = self.up.kill();
+        }
+        let _ = self.up.wait();
+    }
+}
+
+fn patiently<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(got) = attempt() {
+            return got;
+        }
+        assert!(began.elapsed() < PATIENCE, "in vain: {what}");
+        std::thread::sleep(Duration::from_millis(200));
+    }
+}
+
+/// Stamps by sequence number.
+type Stamps = BTreeMap<u64, u64>;
+
+fn note_stamps<T: Message>(input: &mut Input<T>, stamps: &mut Stamps) {
+    while let Some(message) = input.receive() {
+        stamps.insert(message.header().sequence, message.header().stamp_ns);
+    }
+}
+
+/// One reader of one topic: when the step began that took a message, by the message's sequence number.
+struct Reader {
+    trace: Input<Trace>,
+    /// Which of the service's inputs it is, in the order in which its `start` opens them.
+    port: usize,
+    took: Stamps,
+}
+
+impl Reader {
+    fn open(tool: &mut Tool, service: &str, port: usize) -> Self {
+        let trace = tool.ports.input_of(&format!("{}/{service}", Trace::TOPIC), 16).unwrap();
+        Self { trace, port, took: Stamps::new() }
+    }
+
+    fn look(&mut self) {
+        while let Some(trace) = self.trace.receive() {
+            let drained = trace.drained[self.port];
+            for sequence in drained.first..drained.first + u64::from(drained.count) {
+                self.took.insert(sequence, trace.now_ns);
+            }
+        }
+    }
+
+    /// Milliseconds from the stamp of each message to the step that took it.
+    fn delays(&self, stamps: &Stamps) -> Vec<f64> {
+        let pairs = stamps.iter().filter_map(|(sequence, stamp)| Some((*stamp, *self.took.get(sequence)?)));
+        let delays: Vec<f64> = pairs.map(|(sent, took)| milliseconds(sent, took)).collect();
+        let sound = delays.iter().filter(|delay| (0.0..200.0).contains(*delay)).count();
+        assert!(10 * sound > 9 * stamps.len(), "port {} of a service is another topic now", self.port);
+        delays
+    }
+}
+
+/// Mean length of a service's steps, milliseconds.
+struct StepTime {
+    health: Input<Health>,
+    means: Vec<f64>,
+}
+
+impl StepTime {
+    fn open(tool: &mut Tool, service: &str) -> Self {
+        let health = tool.ports.input_of(&format!("{}/{service}", Health::TOPIC), 16).unwrap();
+        Self { health, means: Vec::new() }
+    }
+
+    fn look(&mut self) {
+        while let Some(health) = self.health.receive() {
+            self.means.push(health.mean_step_ns as f64 * 1e-6);
+        }
+    }
+
+    fn mean(&self) -> f64 {
+        self.means.iter().sum::<f64>() / self.means.len().max(1) as f64
+    }
+}
+
+fn milliseconds(earlier_ns: u64, later_ns: u64) -> f64 {
+    ipc_types::seconds_between(earlier_ns, later_ns) * 1e3
+}
+
+/// Where in its period the pilot's tick is due: its steps begin then or a little later. The earliest hundredth is
+/// passed over, for steps so late that they look like early ones.
+fn tick_phase(steps: &Stamps) -> u64 {
+    let first = steps.values().min().copied().unwrap_or(0);
+    let mut phases: Vec<u64> = steps.values().map(|step| (step - first + TICK_NS / 2) % TICK_NS).collect();
+    phases.sort_unstable();
+    (first + phases[phases.len() / 100] + TICK_NS / 2) % TICK_NS
+}
+
+/// Milliseconds until the next tick is due.
+fn wait_for_tick(phase: u64, from: u64) -> f64 {
+    ((phase + TICK_NS - from % TICK_NS) % TICK_NS) as f64 * 1e-6
+}
+
+fn say(what: &str, mut times: Vec<f64>) {
+    times.sort_by(f64::total_cmp);
+    let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize];
+    println!("{what:<76} {:>8.3} {:>8.3}   {:>6}", at(0.5), at(0.99), times.len());
+}
+
+fn main() {
+    let programs = std::env::current_exe().unwrap().ancestors().nth(2).map(Path::to_owned).unwrap();
+    let sereno = programs.join("sereno");
+    if !["sereno", "sereno-pilot", "sereno-simulator"].iter().all(|name| programs.join(name).is_file()) {
+        println!("no programs in {}: cargo build --release --workspace --bins", programs.display());
+        return;
+    }
+    let length = std::env::var("SERENO_BENCH_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(60);
+    let system = System::start(&sereno);
+    let mut tool = patiently("the system answers", || system.join());
+    let mut state = tool.ports.input::<PilotState>(16).unwrap();
+    patiently("the round is flown", || {
+        let phase = state.latest().and_then(|state| Phase::from_code(state.phase));
+        if phase == Some(Phase::Grounded) {
+            // Refused until the flight controller has settled.
+            system.order(&["patrol", "start"]);
+        }
+        (phase == Some(Phase::Autonomous)).then_some(())
+    });
+
+    let mut ranges = tool.ports.input::<SonarRanges>(16).unwrap();
+    let mut channels = tool.ports.input::<Channels>(16).unwrap();
+    let (mut ranges_sent, mut channels_sent) = (Stamps::new(), Stamps::new());
+    let mut pilot = Reader::open(&mut tool, "pilot", 3);
+    let mut localization = Reader::open(&mut tool, "localization", 0);
+    let mut flight = Reader::open(&mut tool, "flight", 0);
+    let mut sonar_step = StepTime::open(&mut tool, "sonar");
+    let mut pilot_step = StepTime::open(&mut tool, "pilot");
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_secs(length) {
+        tool.tick();
+        note_stamps(&mut ranges, &mut ranges_sent);
+        note_stamps(&mut channels, &mut channels_sent);
+        for reader in [&mut pilot, &mut localization, &mut flight] {
+            reader.look();
+        }
+        sonar_step.look();
+        pilot_step.look();
+        std::thread::sleep(GLANCE);
+    }
+
+    let phase = tick_phase(&pilot.took);
+    let made: BTreeMap<u64, u64> =
+        channels_sent.iter().map(|(sequence, stamp)| (*stamp, *sequence)).collect();
+    let (mut whole, mut rest) = (Vec::new(), Vec::new());
+    for (sequence, sent) in &ranges_sent {
+        // What a step publishes carries the time at which it began.
+        let flown = pilot.took.get(sequence).and_then(|step| flight.took.get(made.get(step)?));
+        if let Some(flown) = flown {
+            let way = milliseconds(*sent, *flown);
+            whole.push(way);
+            rest.push(way - wait_for_tick(phase, *sent) - pilot_step.mean() - sonar_step.mean());
+        }
+    }
+    println!(
+        "{length} s of a round; steps last {:.3} ms (sonar) and {:.3} ms (pilot) in the mean",
+        sonar_step.mean(),
+        pilot_step.mean()
+    );
+    println!("{:<76} {:>8} {:>8}   {:>6}", "milliseconds", "p50", "p99", "of");
+    say("sonar/ranges to the step of localization that it wakes", localization.delays(&ranges_sent));
+    say(
+        "sonar/ranges to the pilot's tick that takes it and makes pilot/channels",
+        pilot.delays(&ranges_sent),
+    );
+    say(
+        "pilot/channels to the step of flight that it wakes, the pilot's step included",
+        flight.delays(&channels_sent),
+    );
+    say("sonar/ranges to pilot/channels in flight's hands", whole);
+    say("the same without waiting for the tick and without the steps of sonar and pilot", rest);
+}
