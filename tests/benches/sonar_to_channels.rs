@@ -1,8 +1,8 @@
-//! From `sonar/ranges` to the `pilot/channels` made from it, between real processes on shared memory, in flight.
+//! From `sonar/ranges` to the `pilot/channels` made from it, between real processes in flight.
 //!
-//! Starts the simulated system as `sereno up --sim` does, flies a round and reads the step journals: which step of
+//! Starts the simulated system with `sereno up --sim`, flies a round and reads the step journals: which step of
 //! whom took which message, and when it began. What is left of the way without the steps themselves and without
-//! the waiting for the pilot's tick is what shared memory, wake-ups and the scheduler cost.
+//! waiting for the pilot's tick is what shared memory, wake-ups and the scheduler cost.
 //!
 //! Needs the programs beside it: `cargo build --release --workspace --bins`, then
 //! `cargo bench -p sereno-tests --bench sonar_to_channels`. `SERENO_BENCH_SECONDS` changes the length (60).
@@ -49,10 +49,10 @@ impl System {
         Self::command(&self.sereno, self.run_dir.path()).args(words).status().unwrap().success()
     }
 
-    fn join(&self) -> Option<Tool> {
+    fn join(&self) -> Result<Tool, String> {
         let place = Place { deploy: None, run_dir: Some(self.run_dir.path().to_owned()) };
-        let (manifest, _, run_dir) = place.running().ok()?;
-        Tool::join("cli", manifest, &run_dir).ok()
+        let (manifest, _, run_dir) = place.running().map_err(|error| format!("{error:#}"))?;
+        Tool::join("cli", manifest, &run_dir).map_err(|error| error.to_string())
     }
 }
 
@@ -65,13 +65,13 @@ impl Drop for System {
     }
 }
 
-fn patiently<T>(what: &str, mut attempt: impl FnMut() -> Option<T>) -> T {
+fn patiently<T>(mut attempt: impl FnMut() -> Result<T, String>) -> T {
     let began = Instant::now();
     loop {
-        if let Some(got) = attempt() {
-            return got;
+        match attempt() {
+            Ok(got) => return got,
+            Err(reason) => assert!(began.elapsed() < PATIENCE, "in vain: {reason}"),
         }
-        assert!(began.elapsed() < PATIENCE, "in vain: {what}");
         std::thread::sleep(Duration::from_millis(200));
     }
 }
@@ -145,8 +145,8 @@ fn milliseconds(earlier_ns: u64, later_ns: u64) -> f64 {
     ipc_types::seconds_between(earlier_ns, later_ns) * 1e3
 }
 
-/// Where in its period the pilot's tick is due: its steps begin then or a little later. The earliest hundredth is
-/// passed over, for steps so late that they look like early ones.
+/// Where in its period the pilot's tick is due: its steps begin then or a little later. The earliest hundredth
+/// is passed over, for steps so late that they look like early ones.
 fn tick_phase(steps: &Stamps) -> u64 {
     let first = steps.values().min().copied().unwrap_or(0);
     let mut phases: Vec<u64> = steps.values().map(|step| (step - first + TICK_NS / 2) % TICK_NS).collect();
@@ -174,15 +174,15 @@ fn main() {
     }
     let length = std::env::var("SERENO_BENCH_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(60);
     let system = System::start(&sereno);
-    let mut tool = patiently("the system answers", || system.join());
+    let mut tool = patiently(|| system.join());
     let mut state = tool.ports.input::<PilotState>(16).unwrap();
-    patiently("the round is flown", || {
+    patiently(|| {
         let phase = state.latest().and_then(|state| Phase::from_code(state.phase));
         if phase == Some(Phase::Grounded) {
             // Refused until the flight controller has settled.
             system.order(&["patrol", "start"]);
         }
-        (phase == Some(Phase::Autonomous)).then_some(())
+        if phase == Some(Phase::Autonomous) { Ok(()) } else { Err(format!("phase {phase:?}")) }
     });
 
     let mut ranges = tool.ports.input::<SonarRanges>(16).unwrap();

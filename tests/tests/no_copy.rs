@@ -1,5 +1,5 @@
-//! On shared memory a loaned sample is the working memory: nothing of it is copied on its way, so that fifty thousand
-//! particles cost what five hundred do.
+//! On shared memory a loaned sample is the working memory: nothing of it is copied on its way, so that fifty
+//! thousand particles cost what five hundred do.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use ipc_types::{MAX_PARTICLES, Message, Particles, Pose};
@@ -196,8 +196,7 @@ fn a_message_allocates_its_handle_and_no_more() {
 
 /// Rounds of the race below.
 const ROUNDS: usize = 2001;
-/// Most that one median may be of another. A set that is copied, or only zeroed, takes forty times a pose, and ten
-/// times what a hundredth of it takes.
+/// Most that one median may be of another. A set that is copied, or only zeroed, takes forty times a pose.
 const WITHIN: f64 = 4.0;
 
 fn timed<T: Message>(line: &mut (Output<T>, Input<T>), write: impl Fn(&mut T)) -> f64 {

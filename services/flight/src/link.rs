@@ -17,6 +17,8 @@ const LOST_NS: u64 = 250_000_000;
 const MOST_OUTSTANDING: usize = 3;
 /// Least time between two commands: nearly one pass of the controller's task.
 const SPACING_NS: u64 = 8_000_000;
+/// From the reading of the attitude to now: an answer of 12 bytes at 115200 baud and half a tick of 5 ms.
+const ON_THE_WAY_NS: u64 = 3_500_000;
 /// Half a frame and then nothing for so long: the rest will not come.
 const QUIET_NS: u64 = 50_000_000;
 /// The receiver's order is waited for this long before it is taken for AETR: two passes of the task and more.
@@ -251,7 +253,7 @@ impl Link {
             Question::Rc => self.said.throttle_us = throttle_of(&parse_reply(&Rc, payload)?),
             Question::Attitude => {
                 let reply = parse_reply(&Attitude, payload)?;
-                let sampled_ns = sent_ns + now.saturating_sub(sent_ns) / 2;
+                let sampled_ns = now.saturating_sub(ON_THE_WAY_NS).max(sent_ns);
                 self.said.attitude = Some(AttitudeSample { sampled_ns, reply });
             }
             Question::Api => {

@@ -21,7 +21,7 @@ pub struct Identity {
 /// An attitude and when it was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AttitudeSample {
-    /// Half the round trip before the answer.
+    /// When the controller read it, by the time that the answer is on the way.
     pub sampled_ns: u64,
     /// In the controller's frame.
     pub reply: AttitudeReply,

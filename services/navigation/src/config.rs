@@ -47,7 +47,7 @@ impl Default for NavigationConfig {
         Self {
             height_m: 1.2,
             cruise_m_s: 0.0,
-            door_m_s: 0.28,
+            door_m_s: 0.4,
             turn_rad_s: 1.0,
             scan_deg: 12.0,
             scan_s: 2.4,

@@ -230,7 +230,8 @@ impl Core {
                     self.follow(dt_s, &place, grid, window, &steer, setpoint)
                 } else {
                     self.steering.forget();
-                    setpoint
+                    let aloft = matches!(intent, Intent::Hover(_)) && self.mission.airborne();
+                    if aloft && hearing && place.tracking { give_way(&steer, setpoint) } else { setpoint }
                 };
                 (Some((steer, hearing && place.tracking)), setpoint)
             }
@@ -379,6 +380,17 @@ impl Core {
         patrol.command_sequence = self.mission.command();
         patrol.text = self.text;
     }
+}
+
+/// A hover gives way to what comes too near.
+fn give_way(steer: &Steer, mut setpoint: Setpoint) -> Setpoint {
+    let (vx, vy) = steer.velocity;
+    if vx.hypot(vy) >= STANDING_M_S {
+        setpoint.kind = u32::from(SetpointKind::Velocity.code());
+        (setpoint.velocity_x_m_s, setpoint.velocity_y_m_s) = (vx, vy);
+        (setpoint.hold_x_m, setpoint.hold_y_m) = (f32::NAN, f32::NAN);
+    }
+    setpoint
 }
 
 // The grid message holds exactly the window that the algorithms work on.

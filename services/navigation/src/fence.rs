@@ -17,7 +17,7 @@ const REACH_M: f32 = 1.0;
 /// Speed for each metre of gap, 1/s: half of what the velocity loop follows (its answer takes 0.4 s).
 const GAIN_PER_S: f32 = 1.2;
 /// Gap that is kept, metres: a gust of 0.3 m/s2 carries the drone 5 cm before it is flown back.
-const KEEP_M: f32 = 0.11;
+pub const KEEP_M: f32 = 0.12;
 /// Fastest motion away, metres a second.
 const AWAY_M_S: f32 = 0.2;
 /// Passes over the directions; two opposite ones that are too near settle in the middle.
@@ -31,6 +31,7 @@ pub struct Fence {
     /// Unit vectors, plan frame, and the gap between airframe and what is nearest there, metres.
     sides: [(f32, f32, f32); DIRECTIONS],
     least_m: f32,
+    unmapped_m: f32,
 }
 
 impl Fence {
@@ -38,6 +39,7 @@ impl Fence {
     #[must_use]
     pub fn around(scene: &Scene<'_>, radius_m: f32) -> Self {
         let mut nearest = [f32::INFINITY; DIRECTIONS];
+        let mut unmapped = f32::INFINITY;
         let mut note = |angle: f32, distance: f32| {
             if angle.is_finite() && distance < REACH_M {
                 let side = (angle / TAU * DIRECTIONS as f32).round() as i32;
@@ -56,7 +58,9 @@ impl Fence {
             {
                 if scene.cells.get(index).is_some_and(|cell| *cell >= STANDS_CERTAINTY) {
                     let (cx, cy) = scene.window.centre(index);
-                    note((cy - y).atan2(cx - x), (cx - x).hypot(cy - y));
+                    let distance = (cx - x).hypot(cy - y);
+                    unmapped = unmapped.min(distance);
+                    note((cy - y).atan2(cx - x), distance);
                 }
             }
         }
@@ -69,13 +73,13 @@ impl Fence {
             *side = (cos, sin, seen.min(wall(scene, cos, sin)) - radius_m);
         }
         let least_m = sides.iter().fold(f32::INFINITY, |least, side| least.min(side.2));
-        Self { sides, least_m }
+        Self { sides, least_m, unmapped_m: unmapped - radius_m }
     }
 
-    /// The least gap, metres; infinite when nothing is near.
+    /// The least gap to what no plan shows, metres; infinite when nothing of the kind is near.
     #[must_use]
-    pub fn least_m(&self) -> f32 {
-        self.least_m
+    pub fn unmapped_m(&self) -> f32 {
+        self.unmapped_m
     }
 
     /// What is left of a wish, plan frame, and whether something is nearer than is kept.

@@ -2,7 +2,6 @@
 
 use crate::journey::{Journey, MAX_GIVEN_UP, SAME_STOP_M};
 use crate::place::Place;
-use crate::steer::STANDS_CERTAINTY;
 use avoid::Window;
 use avoid::swath::for_each_certain;
 
@@ -11,6 +10,8 @@ const AHEAD_M: f32 = 1.3;
 const BESIDE_M: f32 = 0.45;
 /// A blockage nearer than this to a door's line is the door, metres: a leaf is ajar by a little.
 const DOOR_M: f32 = 0.35;
+/// What is marked for the rest of the round was heard twice in one place.
+const SURE_CERTAINTY: u8 = 16;
 /// Half of the stretch stamped when nothing was seen and still there was no progress, metres.
 const UNSEEN_HALF_M: f32 = 0.15;
 
@@ -32,7 +33,7 @@ impl Journey {
         let mut nearest = f32::INFINITY;
         if seen_by_sonar {
             let map = &mut self.map;
-            for_each_certain(cells, STANDS_CERTAINTY, |index| {
+            for_each_certain(cells, SURE_CERTAINTY, |index| {
                 let (x, y) = window.centre(index);
                 let (dx, dy) = (x - place.x, y - place.y);
                 let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);

@@ -29,6 +29,8 @@ pub struct Place {
     pub turn: f32,
     /// Larger standard deviation of the position, metres.
     pub sigma: f32,
+    /// Standard deviation of the velocity, metres a second.
+    pub velocity_sigma: f32,
     /// Whether localization believes in it.
     pub tracking: bool,
 }
@@ -64,6 +66,11 @@ impl Place {
             vy: pose.velocity_y_m_s,
             turn: if turn.abs() <= FASTEST_TURN_RAD_S { turn } else { 0.0 },
             sigma: pose.sigma_m(),
+            velocity_sigma: if pose.velocity_sigma_m_s.is_finite() {
+                pose.velocity_sigma_m_s.abs()
+            } else {
+                1.0
+            },
             tracking: state == LocalizationState::Tracking,
         })
     }

@@ -1,7 +1,7 @@
 //! One decision: from the aim on the route to a velocity and a heading.
 
 use crate::config::NavigationConfig;
-use crate::fence::Fence;
+use crate::fence::{self, Fence};
 use crate::place::Place;
 use crate::senses::Senses;
 use crate::track::Track;
@@ -10,8 +10,16 @@ use avoid::{Avoider, ConfigError, Decision, Histogram, Reason, Situation, Vfh, V
 use floorplan::DistanceField;
 use ipc_types::SteeringReason;
 
-/// Certainty at which a cell stands in the way: two readings. A single one may be an outlier (FACTS 8: 1 %).
-pub const STANDS_CERTAINTY: u8 = 16;
+/// Certainty at which a cell stands in the way: one reading, for 2 s. The next ping of what moves or is passed falls
+/// into another cell; an outlier (FACTS 8: 1 %) is cleared by the next ping through it.
+pub const STANDS_CERTAINTY: u8 = 5;
+/// Speed beside something unmapped that is as near as the fence keeps, metres a second, and its growth with the gap, 1/s: what can be
+/// stopped within the gap.
+const BESIDE_M_S: f32 = 0.15;
+const BESIDE_PER_S: f32 = 0.7;
+/// Uncertainty of the velocity that costs no speed, metres a second, and over how much more it falls to the least share.
+const KNOWN_M_S: f32 = 0.08;
+const UNKNOWN_OVER_M_S: f32 = 0.25;
 /// Strip looked at ahead is wider than the airframe by this on each side, metres.
 const SWATH_MARGIN_M: f32 = 0.05;
 /// How far the strip reaches, metres.
@@ -51,6 +59,8 @@ const ASIDE_AHEAD_S: f32 = 0.3;
 /// This far aside of the line in a narrow place there is no motion onward, metres: three quarters of the room
 /// beside a disc of 0.45 m in a door of 0.9 m.
 const ASIDE_STOPS_M: f32 = 0.17;
+/// A route that gets narrower than the drone's place by this leads into a narrow place, metres.
+const ENTERING_M: f32 = 0.12;
 /// Once blocked, the way must be free for this much more, metres.
 const FREE_AGAIN_M: f32 = 0.2;
 /// Less than this much way before the stop is not worth going, metres.
@@ -229,6 +239,7 @@ impl Steering {
         };
         let Some(aim) = aim else {
             self.speed = 0.0;
+            (steer.velocity, _) = Fence::around(scene, self.craft.radius_m).keep((0.0, 0.0));
             return steer;
         };
         let free = |direction: f32| {
@@ -265,17 +276,22 @@ impl Steering {
         speed = speed.min((0.7 * aim.remaining_m).max(CREEP_M_S));
         let unsure = ((place.sigma - SURE_M) / UNSURE_OVER_M).clamp(0.0, 1.0 - LEAST_SHARE);
         speed *= 1.0 - unsure;
+        let swaying = ((place.velocity_sigma - KNOWN_M_S) / UNKNOWN_OVER_M_S).clamp(0.0, 1.0 - LEAST_SHARE);
+        speed *= 1.0 - swaying;
+        let fence = Fence::around(scene, self.craft.radius_m);
+        speed = speed.min(BESIDE_M_S + BESIDE_PER_S * (fence.unmapped_m() - fence::KEEP_M).max(0.0));
         let off = wrap(direction - place.heading).abs();
         speed *= 1.0 - ((off - TURN_FREE_RAD) / (TURN_FIRST_RAD - TURN_FREE_RAD)).clamp(0.0, 1.0);
         speed = speed.min(self.speed + SPEED_UP_M_S2 * scene.dt_s.clamp(0.0, 0.2));
         self.speed = speed;
         let mut wish = (speed * direction.cos(), speed * direction.sin());
+        let entering = scene.field.distance(place.x, place.y) > aim.route_m + ENTERING_M;
         if !self.blocked
             && (narrow || (aim.aside_m < ON_ROUTE_M && steer.reason == SteeringReason::TargetSafe))
         {
-            wish = along(&aim, place, speed, wish);
+            wish = along(&aim, place, speed, entering, wish);
         }
-        let (velocity, backing) = Fence::around(scene, self.craft.radius_m).keep(wish);
+        let (velocity, backing) = fence.keep(wish);
         steer.velocity = velocity;
         if backing {
             steer.reason = SteeringReason::BackingOff;
@@ -307,9 +323,9 @@ fn scan(config: &NavigationConfig, now: u64) -> f32 {
     config.scan_deg.to_radians() * (phase * core::f32::consts::TAU).sin()
 }
 
-/// Along the line and back to it. In a narrow place, the farther aside, the slower onward: a disc of 0.45 m has
+/// Along the line and back to it. On the way into a narrow place, the farther aside, the slower onward: a disc of 0.45 m has
 /// 0.225 m on each side in the middle of a door, and comes to the middle before it goes in.
-fn along(aim: &Aim, place: &Place, speed: f32, wish: (f32, f32)) -> (f32, f32) {
+fn along(aim: &Aim, place: &Place, speed: f32, entering: bool, wish: (f32, f32)) -> (f32, f32) {
     let (tx, ty) = (aim.onward.0 - aim.foot.0, aim.onward.1 - aim.foot.1);
     let length = tx.hypot(ty);
     if length < 0.3 * ONWARD_M {
@@ -321,7 +337,7 @@ fn along(aim: &Aim, place: &Place, speed: f32, wish: (f32, f32)) -> (f32, f32) {
     let across = oy * tx - ox * ty;
     let back = (BACK_PER_S * across).clamp(-BACK_MOST_M_S, BACK_MOST_M_S);
     let soon = across - ASIDE_AHEAD_S * (place.vy * tx - place.vx * ty);
-    let tight = ((OPEN_M - aim.route_m) / (OPEN_M - DOOR_M)).clamp(0.0, 1.0);
+    let tight = if entering { ((OPEN_M - aim.route_m) / (OPEN_M - DOOR_M)).clamp(0.0, 1.0) } else { 0.0 };
     let onward = speed * (1.0 - tight * (across.abs().max(soon.abs()) / ASIDE_STOPS_M).min(1.0));
     (onward * tx - back * ty, onward * ty + back * tx)
 }

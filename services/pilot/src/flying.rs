@@ -20,6 +20,8 @@ const PUSH_CLEARANCE_M: f32 = 0.35;
 const LEARN_CLEARANCE_M: f32 = 0.35;
 /// A velocity that is less certain is not flown by, m/s.
 const MOST_VELOCITY_SIGMA: f32 = 0.6;
+/// Standard deviation of the velocity up to which the full gain is flown, m/s: with optical flow it is 0.04 to 0.07.
+const SURE_VELOCITY: f32 = 0.075;
 /// No wish is flown faster than this many times the vehicle's cruise speed.
 const FASTEST: f32 = 1.2;
 /// A velocity is reckoned on by tilt alone for so long, seconds.
@@ -138,11 +140,12 @@ impl PilotCore {
             && self.pose.velocity_sigma < MOST_VELOCITY_SIGMA
             && self.judged.action != Action::Descend;
         let velocity = velocity_known.then(|| self.motion.velocity());
+        let trust = SURE_VELOCITY / self.pose.velocity_sigma.max(SURE_VELOCITY);
         let most = NEAR_GROUND
             .iter()
             .find(|(height, _)| clearance < *height)
             .map_or(self.craft.max_tilt_rad, |(_, tilt)| *tilt);
-        let tilt = self.velocity.step(dt, guarded.velocity, velocity, heading, most);
+        let tilt = self.velocity.step(dt, guarded.velocity, velocity, trust, heading, most);
         let level = self.level();
         self.learn_trim(dt, level, heading);
         let bound = |angle: f32| angle.clamp(-MOST_TRIM_RAD - most, MOST_TRIM_RAD + most);

@@ -15,7 +15,7 @@ pub struct HoldConfig {
 
 impl Default for HoldConfig {
     fn default() -> Self {
-        Self { gain_per_s: 0.7, max_speed_m_s: 0.35 }
+        Self { gain_per_s: 1.0, max_speed_m_s: 0.35 }
     }
 }
 

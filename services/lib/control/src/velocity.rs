@@ -41,7 +41,7 @@ impl Default for VelocityConfig {
             response_s: 0.2,
             max_disturbance_m_s2: 0.8,
             max_tilt_deg: 10.0,
-            max_tilt_rate_deg_s: 150.0,
+            max_tilt_rate_deg_s: 100.0,
             acceleration_m_s2: 0.8,
             braking_m_s2: 2.5,
             feed_forward: 1.0,
@@ -154,18 +154,21 @@ impl VelocityController {
     }
 
     /// The tilt, from level, for the next step: `wish` and `velocity` in the plan frame, `heading` of the
-    /// body, at most `most_tilt_rad` (and never more than the configured limit). Without a velocity the body
-    /// is held level under the learned disturbance.
+    /// body, at most `most_tilt_rad` (and never more than the configured limit). `trust` (0..=1) in the velocity
+    /// scales the gains: what is not known is not chased. Without a velocity the body is held level under the
+    /// learned disturbance.
     pub fn step(
         &mut self,
         dt: f32,
         wish: Vector,
         velocity: Option<Vector>,
+        trust: f32,
         heading: f32,
         most_tilt_rad: f32,
     ) -> Tilt {
         let c = &self.config;
         let most = most_tilt_rad.min(c.max_tilt_deg.to_radians()).max(0.0);
+        let trust = if trust.is_finite() { trust.clamp(0.2, 1.0) } else { 0.2 };
         let heading = if heading.is_finite() { heading } else { 0.0 };
         let wanted = match velocity.and_then(Vector::known) {
             Some(velocity) => {
@@ -177,10 +180,10 @@ impl VelocityController {
                 self.expected += (self.reference - self.expected) * (dt / c.response_s).min(1.0);
                 let error = self.expected - velocity;
                 let drag = self.reference * self.drag_per_s;
-                let wanted = error * c.gain_per_s + change + drag + self.compensation;
+                let wanted = error * (trust * c.gain_per_s) + change + drag + self.compensation;
                 let saturated = wanted.norm() > GRAVITY_M_S2 * most.tan();
                 if !saturated || error.dot(self.compensation) < 0.0 {
-                    let grown = self.compensation + error * (c.integral_per_s2 * dt);
+                    let grown = self.compensation + error * (trust * c.integral_per_s2 * dt);
                     self.compensation = grown.limited(c.max_disturbance_m_s2);
                 }
                 wanted

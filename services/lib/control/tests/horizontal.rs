@@ -84,7 +84,7 @@ impl Flight {
         let wish =
             wish.unwrap_or_else(|| hold_velocity(&HoldConfig::default(), hold.unwrap(), self.motion.place()));
         let most = 10f32.to_radians();
-        let tilt = self.control.step(0.02, wish, Some(self.motion.velocity()), self.heading, most);
+        let tilt = self.control.step(0.02, wish, Some(self.motion.velocity()), 1.0, self.heading, most);
         assert!(tilt.magnitude() <= most * 1.0001);
         for _ in 0..20 {
             self.link.push_back(tilt);

@@ -1,7 +1,7 @@
 //! Casts a second: rays and cones worked out exactly, and the table that flies; and how often the table is off.
 //!
-//! `SERENO_BENCH_PLAN` names a plan (a map_server header) and `SERENO_BENCH_AT` (`x,y`) a free place on it. Without
-//! them a hall with pillars is drawn, and the place by lot.
+//! `SERENO_BENCH_PLAN` names a plan (the full path of a map_server header) and `SERENO_BENCH_AT` (`x,y`) a free
+//! place on it. Without them a hall with pillars is drawn, and the place by lot.
 #![allow(clippy::print_stdout, reason = "measurements")]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -138,17 +138,18 @@ fn say_how_often_the_table_is_off(name: &str, table: &ConeTable, poses: &Poses) 
     let (mut exact, mut fast) = (vec![0.0; POSES], vec![0.0; POSES]);
     poses.ask(&mut exact, |x, y, angle| exact_cone(plan, model, (x, y), angle));
     poses.ask(&mut fast, |x, y, angle| table.range(x, y, angle));
-    let share = |counts: &dyn Fn(f32, f32) -> bool| {
-        let count = exact.iter().zip(&fast).filter(|(exact, fast)| counts(**exact, **fast)).count();
-        100.0 * count as f64 / POSES as f64
+    let count = |counts: &dyn Fn(f32, f32) -> bool| {
+        exact.iter().zip(&fast).filter(|(exact, fast)| counts(**exact, **fast)).count() as f64
     };
-    let both = share(&|exact, fast| exact.is_finite() && fast.is_finite());
-    let one = share(&|exact, fast| exact.is_finite() != fast.is_finite());
     let far = 2.0 * plan.resolution();
-    let off = share(&|exact, fast| exact.is_finite() && fast.is_finite() && (exact - fast).abs() > far);
+    let ranges = count(&|exact, fast| exact.is_finite() && fast.is_finite());
+    let off = count(&|exact, fast| exact.is_finite() && fast.is_finite() && (exact - fast).abs() > far);
+    let one = count(&|exact, fast| exact.is_finite() != fast.is_finite());
     println!(
-        "{name}: {both:.1} % of {POSES} cones have an echo by table and exact casting, {off:.2} % more than 2 cells \
-         apart; {one:.2} % by only one of them"
+        "{name}: of {POSES} cones {ranges} have an echo by table and by exact casting, {one} by only one of \
+         them; more than 2 cells apart are {off}: {:.2} % of the ranges, {:.2} % of the cones",
+        100.0 * off / ranges,
+        100.0 * off / POSES as f64
     );
 }
 

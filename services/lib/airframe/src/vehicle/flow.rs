@@ -43,6 +43,8 @@ const RANGE_LEAST_M: f64 = 0.02;
 /// Quality over a good floor and its scatter, of 255.
 const QUALITY: f64 = 120.0;
 const QUALITY_SCATTER: f64 = 14.0;
+/// Contrast of a carpet: it has texture, and its pile blurs it.
+const SOFT_CONTRAST: f64 = 0.6;
 /// Bare floor without texture begins where the sum of waves exceeds this share: about one part in forty.
 const BARE_ABOVE: f64 = 0.80;
 
@@ -194,7 +196,7 @@ impl FlowSensor {
         let sum: f64 = self.texture.iter().map(|(kx, ky, phase)| (kx * x + ky * y + phase).sin()).sum();
         let mut contrast = if sum / 3.0 > BARE_ABOVE { 0.2 } else { 1.0 };
         if ground.soft {
-            contrast *= 0.35;
+            contrast *= SOFT_CONTRAST;
         }
         if ground.moving {
             contrast *= 0.25;
