@@ -27,30 +27,30 @@ const TICK_NS: u64 = 20_000_000;
 /// The supervised system; stopped when this goes out of scope.
 struct System {
     sereno: PathBuf,
-    run_dir: tempfile::TempDir,
+    directory: tempfile::TempDir,
     up: Child,
 }
 
 impl System {
-    fn command(sereno: &Path, run_dir: &Path) -> Command {
+    fn command(sereno: &Path, directory: &Path) -> Command {
         let mut command = Command::new(sereno);
-        command.arg("--deploy").arg(checkout().join("deploy")).arg("--run-dir").arg(run_dir);
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command.arg("--deploy").arg(checkout().join("deploy")).arg("--run-dir").arg(directory.join("run"));
+        command.stdin(Stdio::null()).stdout(Stdio::null());
         command
     }
 
     fn start(sereno: &Path) -> Self {
-        let run_dir = tempfile::tempdir().unwrap();
-        let up = Self::command(sereno, run_dir.path()).args(["up", "--sim", "--quiet"]).spawn().unwrap();
-        Self { sereno: sereno.to_owned(), run_dir, up }
+        let directory = tempfile::tempdir().unwrap();
+        let up = Self::command(sereno, directory.path()).args(["up", "--sim", "--quiet"]).spawn().unwrap();
+        Self { sereno: sereno.to_owned(), directory, up }
     }
 
     fn order(&self, words: &[&str]) -> bool {
-        Self::command(&self.sereno, self.run_dir.path()).args(words).status().unwrap().success()
+        Self::command(&self.sereno, self.directory.path()).args(words).status().unwrap().success()
     }
 
     fn join(&self) -> Result<Tool, String> {
-        let place = Place { deploy: None, run_dir: Some(self.run_dir.path().to_owned()) };
+        let place = Place { deploy: None, run_dir: Some(self.directory.path().join("run")) };
         let (manifest, _, run_dir) = place.running().map_err(|error| format!("{error:#}"))?;
         Tool::join("cli", manifest, &run_dir).map_err(|error| error.to_string())
     }

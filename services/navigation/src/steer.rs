@@ -52,13 +52,13 @@ const ON_ROUTE_M: f32 = 0.25;
 /// Length of route that its direction is taken from, metres.
 const ONWARD_M: f32 = 0.3;
 /// The drone comes back to the line at this rate, 1/s: a quarter of the velocity loop's.
-const BACK_PER_S: f32 = 1.2;
+const BACK_PER_S: f32 = 1.5;
 const BACK_MOST_M_S: f32 = 0.25;
 /// Where it will be aside of the line is looked at this far ahead, seconds: what the velocity loop takes to turn it.
 const ASIDE_AHEAD_S: f32 = 0.3;
-/// This far aside of the line in a narrow place there is no motion onward, metres: three quarters of the room
+/// This far aside of the line in a narrow place there is no motion onward, metres: half of the room
 /// beside a disc of 0.45 m in a door of 0.9 m.
-const ASIDE_STOPS_M: f32 = 0.17;
+const ASIDE_STOPS_M: f32 = 0.12;
 /// A route that gets narrower than the drone's place by this leads into a narrow place, metres.
 const ENTERING_M: f32 = 0.12;
 /// Once blocked, the way must be free for this much more, metres.

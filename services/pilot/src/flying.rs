@@ -135,10 +135,10 @@ impl PilotCore {
             self.walls.as_deref(),
             clearance > PUSH_CLEARANCE_M,
         );
-        // A body that comes down level has no place and no velocity to fly by.
+        // Who is lost comes down level, but for the drift that the floor itself shows.
         let velocity_known = age_s(self.pose.at, now) < RECKON_S
             && self.pose.velocity_sigma < MOST_VELOCITY_SIGMA
-            && self.judged.action != Action::Descend;
+            && (self.judged.action != Action::Descend || self.pose.velocity_sigma < SURE_VELOCITY);
         let velocity = velocity_known.then(|| self.motion.velocity());
         let trust = SURE_VELOCITY / self.pose.velocity_sigma.max(SURE_VELOCITY);
         let most = NEAR_GROUND
