@@ -118,26 +118,29 @@ impl Reader {
     }
 }
 
-/// Mean length of a service's steps, milliseconds.
-struct StepTime {
+/// What a service says of its own steps.
+struct Steps {
+    service: &'static str,
     health: Input<Health>,
-    means: Vec<f64>,
+    mean_ms: Vec<f64>,
+    lateness_ms: Vec<f64>,
 }
 
-impl StepTime {
-    fn open(tool: &mut Tool, service: &str) -> Self {
+impl Steps {
+    fn open(tool: &mut Tool, service: &'static str) -> Self {
         let health = tool.ports.input_of(&format!("{}/{service}", Health::TOPIC), 16).unwrap();
-        Self { health, means: Vec::new() }
+        Self { service, health, mean_ms: Vec::new(), lateness_ms: Vec::new() }
     }
 
     fn look(&mut self) {
         while let Some(health) = self.health.receive() {
-            self.means.push(health.mean_step_ns as f64 * 1e-6);
+            self.mean_ms.push(health.mean_step_ns as f64 * 1e-6);
+            self.lateness_ms.push(health.lateness_ns as f64 * 1e-6);
         }
     }
 
-    fn mean(&self) -> f64 {
-        self.means.iter().sum::<f64>() / self.means.len().max(1) as f64
+    fn mean_ms(&self) -> f64 {
+        self.mean_ms.iter().sum::<f64>() / self.mean_ms.len().max(1) as f64
     }
 }
 
@@ -146,7 +149,8 @@ fn milliseconds(earlier_ns: u64, later_ns: u64) -> f64 {
 }
 
 /// Where in its period the pilot's tick is due: its steps begin then or a little later. The earliest hundredth
-/// is passed over, for steps so late that they look like early ones.
+/// is passed over, for steps so late that they look like early ones. When all are late this is too: what is left
+/// of a way is then said to be shorter than it is, never longer.
 fn tick_phase(steps: &Stamps) -> u64 {
     let first = steps.values().min().copied().unwrap_or(0);
     let mut phases: Vec<u64> = steps.values().map(|step| (step - first + TICK_NS / 2) % TICK_NS).collect();
@@ -191,8 +195,7 @@ fn main() {
     let mut pilot = Reader::open(&mut tool, "pilot", 3);
     let mut localization = Reader::open(&mut tool, "localization", 0);
     let mut flight = Reader::open(&mut tool, "flight", 0);
-    let mut sonar_step = StepTime::open(&mut tool, "sonar");
-    let mut pilot_step = StepTime::open(&mut tool, "pilot");
+    let mut steps = ["sonar", "pilot", "flight"].map(|service| Steps::open(&mut tool, service));
     let began = Instant::now();
     while began.elapsed() < Duration::from_secs(length) {
         tool.tick();
@@ -201,12 +204,12 @@ fn main() {
         for reader in [&mut pilot, &mut localization, &mut flight] {
             reader.look();
         }
-        sonar_step.look();
-        pilot_step.look();
+        steps.iter_mut().for_each(Steps::look);
         std::thread::sleep(GLANCE);
     }
 
     let phase = tick_phase(&pilot.took);
+    let stepping = steps[0].mean_ms() + steps[1].mean_ms();
     let made: BTreeMap<u64, u64> =
         channels_sent.iter().map(|(sequence, stamp)| (*stamp, *sequence)).collect();
     let (mut whole, mut rest) = (Vec::new(), Vec::new());
@@ -216,15 +219,10 @@ fn main() {
         if let Some(flown) = flown {
             let way = milliseconds(*sent, *flown);
             whole.push(way);
-            rest.push(way - wait_for_tick(phase, *sent) - pilot_step.mean() - sonar_step.mean());
+            rest.push(way - wait_for_tick(phase, *sent) - stepping);
         }
     }
-    println!(
-        "{length} s of a round; steps last {:.3} ms (sonar) and {:.3} ms (pilot) in the mean",
-        sonar_step.mean(),
-        pilot_step.mean()
-    );
-    println!("{:<76} {:>8} {:>8}   {:>6}", "milliseconds", "p50", "p99", "of");
+    println!("{length} s of a round, in milliseconds {:>59} {:>8}   {:>6}", "p50", "p99", "of");
     say("sonar/ranges to the step of localization that it wakes", localization.delays(&ranges_sent));
     say(
         "sonar/ranges to the pilot's tick that takes it and makes pilot/channels",
@@ -235,5 +233,9 @@ fn main() {
         flight.delays(&channels_sent),
     );
     say("sonar/ranges to pilot/channels in flight's hands", whole);
-    say("the same without waiting for the tick and without the steps of sonar and pilot", rest);
+    say("without waiting until the tick is due and the mean steps of sonar and pilot", rest);
+    for steps in steps {
+        println!("{}: {:.3} ms a step in the mean", steps.service, steps.mean_ms());
+        say("  latest start of a step in a report", steps.lateness_ms);
+    }
 }

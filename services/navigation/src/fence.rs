@@ -17,7 +17,7 @@ const REACH_M: f32 = 1.0;
 /// Speed for each metre of gap, 1/s: half of what the velocity loop follows (its answer takes 0.4 s).
 const GAIN_PER_S: f32 = 1.2;
 /// Gap that is kept, metres: a gust of 0.3 m/s2 carries the drone 5 cm before it is flown back.
-pub const KEEP_M: f32 = 0.12;
+pub const KEEP_M: f32 = 0.15;
 /// Fastest motion away, metres a second.
 const AWAY_M_S: f32 = 0.2;
 /// Passes over the directions; two opposite ones that are too near settle in the middle.

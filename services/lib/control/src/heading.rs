@@ -16,7 +16,7 @@ pub struct HeadingConfig {
 
 impl Default for HeadingConfig {
     fn default() -> Self {
-        Self { gain_per_s: 1.5, max_rate_deg_s: 45.0 }
+        Self { gain_per_s: 2.5, max_rate_deg_s: 45.0 }
     }
 }
 

@@ -13,10 +13,13 @@ use rand::Rng;
 
 /// Half-angle of the cone (FACTS 2).
 pub const HALF_ANGLE_RAD: f32 = 15.0 * std::f32::consts::PI / 180.0;
-/// Rays: one on the axis and rings of 6, 12 and 18.
-const RINGS: [usize; 3] = [6, 12, 18];
-const RAYS: usize = 1 + 6 + 12 + 18;
-/// Loss at the edge of the cone, there and back, growing with the square of the angle.
+/// Off the axis by this and less something is heard at all: the cone is where things of every size are heard at
+/// every range, and what is large and near is heard a little beyond it.
+const WIDEST_RAD: f32 = 24.0 * std::f32::consts::PI / 180.0;
+/// Rays: one on the axis and rings of 6, 12, 18 and 20, and how far off the axis they look, in degrees.
+const RINGS: [(usize, f32); 4] = [(6, 5.0), (12, 10.0), (18, 15.0), (20, 21.0)];
+const RAYS: usize = 1 + 6 + 12 + 18 + 20;
+/// Loss at the edge of the cone, there and back, growing with the square of the angle, and beyond it with its cube.
 const EDGE_LOSS_DB: f32 = 8.0;
 /// Loss at 10 degrees of incidence, growing with the square of the angle: plaster, coats, glass.
 const HARD_LOSS_DB: f32 = 9.0;
@@ -83,10 +86,10 @@ impl Cone {
     pub fn new() -> Self {
         let mut rays = [(1.0, 0.0, 0.0, 0.0); RAYS];
         let mut next = 1;
-        for (ring, count) in RINGS.iter().enumerate() {
-            let off = HALF_ANGLE_RAD * (ring + 1) as f32 / RINGS.len() as f32;
-            for k in 0..*count {
-                let around = std::f32::consts::TAU * k as f32 / *count as f32;
+        for (count, degrees) in RINGS {
+            let off = degrees.to_radians();
+            for k in 0..count {
+                let around = std::f32::consts::TAU * k as f32 / count as f32;
                 let (sin, cos) = around.sin_cos();
                 rays[next] = (off.cos(), off.sin() * cos, off.sin() * sin, beam_loss(off));
                 next += 1;
@@ -131,7 +134,8 @@ impl Cone {
 }
 
 fn beam_loss(off_rad: f32) -> f32 {
-    EDGE_LOSS_DB * (off_rad / HALF_ANGLE_RAD).powi(2)
+    let off = off_rad / HALF_ANGLE_RAD;
+    EDGE_LOSS_DB * if off > 1.0 { off.powi(3) } else { off.powi(2) }
 }
 
 /// Loss by a surface that is met at an angle.
@@ -181,7 +185,7 @@ fn fine_things(world: &World, face: [f32; 3], axis: [f32; 3], near: f32, mood: &
         return None;
     }
     let middle = (face[0] + axis[0] * near * 0.5, face[1] + axis[1] * near * 0.5);
-    let wide = near * (HALF_ANGLE_RAD.sin() + 0.02);
+    let wide = near * (WIDEST_RAD.sin() + 0.02);
     let (hx, hy) = (
         (axis[0] * near * 0.5).abs() + wide * axis[1].abs() + 0.1,
         (axis[1] * near * 0.5).abs() + wide * axis[0].abs() + 0.1,
@@ -213,7 +217,7 @@ fn aim(face: [f32; 3], axis: [f32; 3], place: [f32; 3], limit: f32) -> Option<([
     }
     let along = to.map(|v| v / range);
     let cosine = dot(along, axis);
-    (cosine >= HALF_ANGLE_RAD.cos()).then(|| (along, range, beam_loss(cosine.min(1.0).acos())))
+    (cosine >= WIDEST_RAD.cos()).then(|| (along, range, beam_loss(cosine.min(1.0).acos())))
 }
 
 fn is_seen(world: &World, face: [f32; 3], along: [f32; 3], range: f32) -> bool {
