@@ -57,13 +57,10 @@ impl Journey {
             self.map.set_door(door, true);
             self.review = true;
             // The line between the posts is marked too: it survives a restart, the door's state does not.
-            if let Some(door) = self.map.doors().get(door).cloned() {
+            if let Some((a, b)) = self.map.doors().get(door).map(|door| (door.a, door.b)) {
                 for i in 0..=8 {
                     let t = i as f32 / 8.0;
-                    self.map.mark_unmapped(
-                        door.a.0 + t * (door.b.0 - door.a.0),
-                        door.a.1 + t * (door.b.1 - door.a.1),
-                    );
+                    self.map.mark_unmapped(a.0 + t * (b.0 - a.0), a.1 + t * (b.1 - a.1));
                 }
             }
         }

@@ -60,12 +60,12 @@ impl Default for SonarConfig {
         Self {
             sigma: 0.06,
             sigma_per_m: 0.015,
-            short: 0.06,
+            short: 0.12,
             missed: 0.18,
-            random: 0.05,
+            random: 0.1,
             unexpected: 0.35,
             temper: 0.5,
-            floor: 0.01,
+            floor: 0.05,
             max_range: 4.0,
             max_elevation: 0.35,
         }
@@ -91,7 +91,7 @@ pub struct PopulationConfig {
 
 impl Default for PopulationConfig {
     fn default() -> Self {
-        Self { min: 600, max: 3_000, error: 0.04, bin: 0.1, heading_bin: 0.17, velocity_bin: 0.2 }
+        Self { min: 1_000, max: 5_000, error: 0.04, bin: 0.1, heading_bin: 0.17, velocity_bin: 0.2 }
     }
 }
 

@@ -19,17 +19,20 @@ const LOSS_M: f32 = 0.04;
 /// Angles that an opening is measured at.
 const ANGLES: usize = 36;
 
+/// A place or a direction, plan frame.
+type Place = (f32, f32);
+
 struct Gate {
     /// How far along the route.
     along: f32,
-    middle: (f32, f32),
+    middle: Place,
     /// Unit vector through the opening, as the route goes.
-    axis: (f32, f32),
+    axis: Place,
     half_m: f32,
 }
 
 /// The same route, straight through its gates.
-pub(crate) fn straightened(map: &Costmap, points: Vec<(f32, f32)>) -> Vec<(f32, f32)> {
+pub(crate) fn straightened(map: &Costmap, points: Vec<Place>) -> Vec<Place> {
     let samples = sampled(&points);
     let total = samples.last().map_or(0.0, |sample| sample.1);
     let mut out = points;
@@ -64,7 +67,7 @@ pub(crate) fn straightened(map: &Costmap, points: Vec<(f32, f32)>) -> Vec<(f32, 
 }
 
 /// Corners before one place along a line and after another; its two ends are always kept.
-fn split(points: &[(f32, f32)], until: f32, from: f32) -> (Vec<(f32, f32)>, Vec<(f32, f32)>) {
+fn split(points: &[Place], until: f32, from: f32) -> (Vec<Place>, Vec<Place>) {
     let (mut head, mut tail, mut along) = (Vec::new(), Vec::new(), 0.0);
     for (i, point) in points.iter().enumerate() {
         if let Some(last) = i.checked_sub(1).and_then(|last| points.get(last)) {
@@ -79,7 +82,7 @@ fn split(points: &[(f32, f32)], until: f32, from: f32) -> (Vec<(f32, f32)>, Vec<
     (head, tail)
 }
 
-fn sampled(points: &[(f32, f32)]) -> Vec<((f32, f32), f32)> {
+fn sampled(points: &[Place]) -> Vec<(Place, f32)> {
     let mut samples = Vec::new();
     let mut start = 0.0;
     for pair in points.windows(2) {
@@ -96,7 +99,7 @@ fn sampled(points: &[(f32, f32)]) -> Vec<((f32, f32), f32)> {
     samples
 }
 
-fn gates(field: &DistanceField, samples: &[((f32, f32), f32)]) -> Vec<Gate> {
+fn gates(field: &DistanceField, samples: &[(Place, f32)]) -> Vec<Gate> {
     let mut found: Vec<Gate> = Vec::new();
     let clearance: Vec<f32> = samples.iter().map(|((x, y), _)| field.distance(*x, *y)).collect();
     let window = (APART_M / STEP_M) as usize;
@@ -122,7 +125,7 @@ fn gates(field: &DistanceField, samples: &[((f32, f32), f32)]) -> Vec<Gate> {
 }
 
 /// The narrowest opening around a place: its middle, the unit vector across it, half its width.
-fn narrowest(field: &DistanceField, place: (f32, f32)) -> Option<((f32, f32), (f32, f32), f32)> {
+fn narrowest(field: &DistanceField, place: Place) -> Option<(Place, Place, f32)> {
     let mut middle = place;
     let mut best = None;
     // Each pass measures from the middle of the last: three are enough from anywhere in a door.
@@ -146,7 +149,7 @@ fn narrowest(field: &DistanceField, place: (f32, f32)) -> Option<((f32, f32), (f
 }
 
 /// Free way in a direction, metres, looked at as far as a gate is wide.
-fn way(field: &DistanceField, from: (f32, f32), along: (f32, f32)) -> f32 {
+fn way(field: &DistanceField, from: Place, along: Place) -> f32 {
     let mut way = 0.0;
     while way < WIDEST_M {
         let free = field.distance(from.0 + way * along.0, from.1 + way * along.1);
@@ -164,7 +167,7 @@ fn open(map: &Costmap, gate: &Gate, lead: f32) -> bool {
     clear(map, gate.middle, end, gate.half_m)
 }
 
-fn clear(map: &Costmap, a: (f32, f32), b: (f32, f32), half_m: f32) -> bool {
+fn clear(map: &Costmap, a: Place, b: Place, half_m: f32) -> bool {
     let least = (half_m - LOSS_M).min(map.limits().clearance_m());
     let count = ((b.0 - a.0).hypot(b.1 - a.1) / STEP_M).ceil().max(1.0);
     (0..=count as usize).all(|k| {

@@ -127,6 +127,7 @@ impl Drone {
             vy: self.vy,
             turn: 0.0,
             sigma: 0.03,
+            velocity_sigma: 0.05,
             tracking: true,
         }
     }

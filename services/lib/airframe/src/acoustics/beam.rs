@@ -17,9 +17,9 @@ pub const HALF_ANGLE_RAD: f32 = 15.0 * std::f32::consts::PI / 180.0;
 /// every range, and what is large and near is heard a little beyond it.
 const WIDEST_RAD: f32 = 24.0 * std::f32::consts::PI / 180.0;
 /// Rays: one on the axis and rings of 6, 12, 18 and 20, and how far off the axis they look, in degrees.
-const RINGS: [(usize, f32); 4] = [(6, 5.0), (12, 10.0), (18, 15.0), (20, 21.0)];
+const RINGS: [(usize, f32); 4] = [(6, 5.0), (12, 10.0), (18, 15.0), (20, 20.0)];
 const RAYS: usize = 1 + 6 + 12 + 18 + 20;
-/// Loss at the edge of the cone, there and back, growing with the square of the angle, and beyond it with its cube.
+/// Loss at the edge of the cone, there and back, growing with the square of the angle, and beyond it with its fourth power.
 const EDGE_LOSS_DB: f32 = 8.0;
 /// Loss at 10 degrees of incidence, growing with the square of the angle: plaster, coats, glass.
 const HARD_LOSS_DB: f32 = 9.0;
@@ -135,7 +135,7 @@ impl Cone {
 
 fn beam_loss(off_rad: f32) -> f32 {
     let off = off_rad / HALF_ANGLE_RAD;
-    EDGE_LOSS_DB * if off > 1.0 { off.powi(3) } else { off.powi(2) }
+    EDGE_LOSS_DB * if off > 1.0 { off.powi(4) } else { off.powi(2) }
 }
 
 /// Loss by a surface that is met at an angle.
