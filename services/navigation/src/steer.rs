@@ -285,9 +285,11 @@ impl Steering {
         speed = speed.min(self.speed + SPEED_UP_M_S2 * scene.dt_s.clamp(0.0, 0.2));
         self.speed = speed;
         let mut wish = (speed * direction.cos(), speed * direction.sin());
+        // Beside something unmapped the histogram steers, and the line does not pull back.
+        let alone = fence.unmapped_m().is_infinite();
         let entering = scene.field.distance(place.x, place.y) > aim.route_m + ENTERING_M;
         if !self.blocked
-            && (narrow || (aim.aside_m < ON_ROUTE_M && steer.reason == SteeringReason::TargetSafe))
+            && (narrow || (aim.aside_m < ON_ROUTE_M && steer.reason == SteeringReason::TargetSafe && alone))
         {
             wish = along(&aim, place, speed, entering, wish);
         }

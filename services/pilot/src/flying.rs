@@ -22,6 +22,8 @@ const LEARN_CLEARANCE_M: f32 = 0.35;
 const MOST_VELOCITY_SIGMA: f32 = 0.6;
 /// Standard deviation of the velocity up to which the full gain is flown, m/s: with optical flow it is 0.04 to 0.07.
 const SURE_VELOCITY: f32 = 0.075;
+/// An older pose only reckons the velocity on, seconds: three of them are missing.
+const FRESH_POSE_S: f32 = 0.15;
 /// No wish is flown faster than this many times the vehicle's cruise speed.
 const FASTEST: f32 = 1.2;
 /// A velocity is reckoned on by tilt alone for so long, seconds.
@@ -140,7 +142,11 @@ impl PilotCore {
             && self.pose.velocity_sigma < MOST_VELOCITY_SIGMA
             && (self.judged.action != Action::Descend || self.pose.velocity_sigma < SURE_VELOCITY);
         let velocity = velocity_known.then(|| self.motion.velocity());
-        let trust = SURE_VELOCITY / self.pose.velocity_sigma.max(SURE_VELOCITY);
+        let trust = if age_s(self.pose.at, now) > FRESH_POSE_S {
+            0.0
+        } else {
+            SURE_VELOCITY / self.pose.velocity_sigma.max(SURE_VELOCITY)
+        };
         let most = NEAR_GROUND
             .iter()
             .find(|(height, _)| clearance < *height)

@@ -85,9 +85,10 @@ const MEMORY: usize = 32;
 const MAX_BIAS_M_S2: f32 = 3.5;
 /// Period of a reading from which the gate starts to widen, seconds.
 const USUAL_PERIOD_S: f32 = 0.06;
-/// Errors that grow so often in a row are a motion of the drone: by chance, over a soft chair whose echoes come 2 to
-/// 10 cm late, they grow three times in every sixth try, five times in every hundred and twentieth.
-const JOLT_READINGS: u32 = 4;
+/// Errors that grow so often in a row, and to so much, are a motion of the drone, metres: over a soft chair echoes
+/// come 2 to 10 cm late, and grow by chance.
+const JOLT_READINGS: u32 = 2;
+const JOLT_M: f32 = 0.15;
 /// Levels that differ by less are the same, metres.
 const SAME_LEVEL_M: f32 = 0.06;
 /// A thing so thin is flown over like the floor, metres; estimates of the level drift by less.
@@ -236,7 +237,7 @@ impl HeightEstimator {
             error_m: error,
             at_ns,
         };
-        if self.doubt.growing >= JOLT_READINGS {
+        if self.doubt.growing >= JOLT_READINGS && error.abs() > JOLT_M {
             let climb = (error - last.error_m) / seconds(last.at_ns, at_ns).max(0.02);
             self.doubt = Doubt::default();
             self.last_echo_ns = at_ns;

@@ -101,6 +101,9 @@ impl Tilt {
     }
 }
 
+/// Trust in the velocity below which no disturbance is learned.
+const LEAST_TRUST: f32 = 0.4;
+
 /// The controller: proportional and integral on what the velocity misses of a reference model, feed-forward
 /// of the wished change.
 #[derive(Clone, Debug)]
@@ -183,7 +186,9 @@ impl VelocityController {
                 let wanted = error * (trust * c.gain_per_s) + change + drag + self.compensation;
                 let saturated = wanted.norm() > GRAVITY_M_S2 * most.tan();
                 if !saturated || error.dot(self.compensation) < 0.0 {
-                    let grown = self.compensation + error * (trust * c.integral_per_s2 * dt);
+                    // A velocity that is only reckoned on teaches nothing: it follows what was learned.
+                    let learn = if trust < LEAST_TRUST { 0.0 } else { trust };
+                    let grown = self.compensation + error * (learn * c.integral_per_s2 * dt);
                     self.compensation = grown.limited(c.max_disturbance_m_s2);
                 }
                 wanted

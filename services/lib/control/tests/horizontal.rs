@@ -84,7 +84,9 @@ impl Flight {
         let wish =
             wish.unwrap_or_else(|| hold_velocity(&HoldConfig::default(), hold.unwrap(), self.motion.place()));
         let most = 10f32.to_radians();
-        let tilt = self.control.step(0.02, wish, Some(self.motion.velocity()), 1.0, self.heading, most);
+        // As the pilot does: old poses are not trusted.
+        let trust = if self.motion.age_s(self.now_ns) > 0.25 { 0.2 } else { 1.0 };
+        let tilt = self.control.step(0.02, wish, Some(self.motion.velocity()), trust, self.heading, most);
         assert!(tilt.magnitude() <= most * 1.0001);
         for _ in 0..20 {
             self.link.push_back(tilt);

@@ -60,12 +60,12 @@ impl Default for SonarConfig {
         Self {
             sigma: 0.06,
             sigma_per_m: 0.015,
-            short: 0.12,
+            short: 0.06,
             missed: 0.18,
-            random: 0.1,
+            random: 0.05,
             unexpected: 0.35,
             temper: 0.5,
-            floor: 0.05,
+            floor: 0.01,
             max_range: 4.0,
             max_elevation: 0.35,
         }
