@@ -36,17 +36,7 @@ fn main() -> Result<()> {
     let lines: usize = words.next().map_or(Ok(25), |word| word.parse())?;
     let deploy =
         words.next().map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy"), Into::into);
-    let files = format!("{0}/system.toml:{0}/sim.toml", deploy.display());
-    let (mut manifest, root) = runtime::load_manifest(&files)?;
-    manifest.system.vehicle = format!("vehicles/{vehicle}.toml");
-    let setup = Setup {
-        manifest,
-        root,
-        simulator: simulator::Config { clutter, ..simulator::Config::default() },
-        navigation: None,
-        patience_s: 1500.0,
-        cache: runtime::Cache::default(),
-    };
+    let setup = Setup::simulated(&deploy, &vehicle, clutter, 1500.0)?;
     let next = AtomicU64::new(first);
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let told = std::sync::Mutex::new(Vec::<(u64, String)>::new());

@@ -17,19 +17,16 @@ fn main() -> Result<()> {
     let clutter = words.next().unwrap_or_else(|| "full".to_owned());
     let vehicle = words.next().unwrap_or_else(|| "watchman".to_owned());
     let deploy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy");
-    let files = format!("{0}/system.toml:{0}/sim.toml", deploy.display());
-    let (mut manifest, root) = runtime::load_manifest(&files)?;
-    manifest.system.vehicle = format!("vehicles/{vehicle}.toml");
-    let start = runtime::Start::new(manifest.system.clone(), &root, 0, 0, true, runtime::Cache::default())?;
+    let setup = Setup::simulated(&deploy, &vehicle, clutter, to)?;
+    let start = runtime::Start::new(
+        setup.manifest.system.clone(),
+        &setup.root,
+        0,
+        0,
+        true,
+        runtime::Cache::default(),
+    )?;
     let plan = start.plan()?;
-    let setup = Setup {
-        manifest,
-        root,
-        simulator: simulator::Config { clutter, ..simulator::Config::default() },
-        navigation: None,
-        patience_s: to,
-        cache: runtime::Cache::default(),
-    };
     let mut flight = Flight::start(&setup, seed)?;
     let mut ports = flight.bus.tool("cli");
     let mut ranges = ports.input::<SonarRanges>(16)?;

@@ -15,17 +15,7 @@ fn main() -> Result<()> {
     let clutter = words.next().unwrap_or_else(|| "full".to_owned());
     let vehicle = words.next().unwrap_or_else(|| "watchman".to_owned());
     let deploy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy");
-    let files = format!("{0}/system.toml:{0}/sim.toml", deploy.display());
-    let (mut manifest, root) = runtime::load_manifest(&files)?;
-    manifest.system.vehicle = format!("vehicles/{vehicle}.toml");
-    let setup = Setup {
-        manifest,
-        root,
-        simulator: simulator::Config { clutter, ..simulator::Config::default() },
-        navigation: None,
-        patience_s: seconds,
-        cache: runtime::Cache::default(),
-    };
+    let setup = Setup::simulated(&deploy, &vehicle, clutter, seconds)?;
     let began = std::time::Instant::now();
     let mut flight = Flight::start(&setup, seed)?;
     println!("started in {:.2} s", began.elapsed().as_secs_f64());

@@ -28,6 +28,20 @@ pub struct Setup {
     pub cache: Cache,
 }
 
+impl Setup {
+    /// The simulated system of a `deploy` directory, with a vehicle of its `vehicles` and clutter by its word.
+    ///
+    /// # Errors
+    /// When the manifest is missing or wrong.
+    pub fn simulated(deploy: &Path, vehicle: &str, clutter: String, patience_s: f64) -> Result<Self> {
+        let files = format!("{0}/system.toml:{0}/sim.toml", deploy.display());
+        let (mut manifest, root) = runtime::load_manifest(&files)?;
+        manifest.system.vehicle = format!("vehicles/{vehicle}.toml");
+        let simulator = simulator::Config { clutter, ..simulator::Config::default() };
+        Ok(Self { manifest, root, simulator, navigation: None, patience_s, cache: Cache::default() })
+    }
+}
+
 /// A flight being flown.
 pub struct Flight {
     /// The services.

@@ -108,6 +108,8 @@ section! {
         temper: f32,
         /// Log odds a reading.
         raise: f32,
+        /// Most that a reading too short for the place raises the log odds.
+        raise_short: f32,
         /// Log odds a reading.
         lower: f32,
         /// Per second.

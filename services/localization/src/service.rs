@@ -9,7 +9,7 @@ use crate::set::{MEMORY_GROUNDED, Set, columns, columns_mut, fold};
 use crate::start::{Place, place};
 use crate::sweep::{Group, Waiting};
 use crate::velocity::{Frames, Velocity};
-use floorplan::{ConeModel, ConeTable};
+use floorplan::{ConeModel, ConeTable, cast_cone};
 use ipc_types::{
     Attitude, FlowMotion, LocalizationState, MAX_PARTICLES, Particles, PilotState, Pose, SonarRanges, Text,
 };
@@ -28,6 +28,11 @@ const LARGEST_LEVEL: f32 = 0.05;
 const BEHIND_S: f64 = 0.04;
 /// Doubt of a set that was drawn in the air because nothing better was left.
 const HOPELESS: f32 = 0.9;
+/// Half of the cone in which a wall's nearest point is looked for, radians, and the rays over it, two degrees apart.
+const WIDE_RAD: f32 = 20.0 * core::f32::consts::PI / 180.0;
+const WIDE_RAYS: usize = 21;
+/// With a place less sure than this, metres, echoes are compared with the wrong walls.
+const SURE_M: f32 = 0.2;
 /// After so long, nanoseconds, a set that was sent and did not come back is given up and the last one that
 /// did is used again.
 const ECHO_TIMEOUT_NS: u64 = 100_000_000;
@@ -44,6 +49,9 @@ pub struct Localization {
 
     config: LocalizationConfig,
     filter: Filter<Arc<ConeTable>>,
+    table: Arc<ConeTable>,
+    /// The sonars as the velocity looks through them: exactly, and as wide as large things are heard.
+    cone: ConeModel,
     plan: u32,
     pad: Place,
     seed: u64,
@@ -86,7 +94,8 @@ impl Service for Localization {
             table.allocate();
             Ok(table)
         })?;
-        let filter = Filter::new(config.filter(), table, MAX_PARTICLES).map_err(StartError::invalid)?;
+        let filter =
+            Filter::new(config.filter(), Arc::clone(&table), MAX_PARTICLES).map_err(StartError::invalid)?;
         let mut service = Self {
             ranges: ports.input(8)?,
             attitude: ports.input(16)?,
@@ -97,6 +106,8 @@ impl Service for Localization {
             particles: ports.output()?,
             config,
             filter,
+            table,
+            cone: ConeModel { half_angle_rad: WIDE_RAD, sub_rays: WIDE_RAYS, ..model },
             plan: hash,
             pad,
             seed: start.seed,
@@ -337,9 +348,17 @@ impl Localization {
         self.sent_ns = now;
         let believed = Believed { time_ns, estimate: update.estimate, count: update.count };
         let (e, frames) = (&believed.estimate, self.frames(&believed));
-        if group.is_some() {
+        if let Some(group) = group {
             let (place, velocity) = ([e.x, e.y], [e.velocity_x, e.velocity_y]);
             self.velocity.place(time_ns, place, velocity, &self.attitudes, &frames);
+            // Only where the walls are known to be the ones meant.
+            let sure = e.sigma() < SURE_M;
+            let plan = self.table.plan();
+            for ranged in group.ranged().filter(|_| sure) {
+                self.velocity.range(time_ns, &ranged, &self.attitudes, &frames, |x, y, angle| {
+                    cast_cone(plan, &self.cone, x, y, angle)
+                });
+            }
         }
         self.believed = Some(believed);
     }

@@ -1,5 +1,6 @@
 //! Ping groups waiting for their update.
 
+use crate::velocity::Ranged;
 use ipc_types::{MAX_SONARS, SonarHealth, SonarRanges, SonarReading, SonarStatus};
 use mcl::{Echo, Reading};
 
@@ -59,6 +60,19 @@ impl Group {
 
     pub(crate) fn readings(&self) -> &[Reading] {
         &self.readings[..self.count]
+    }
+
+    /// The echoes, by sensor.
+    pub(crate) fn ranged(&self) -> impl Iterator<Item = Ranged> {
+        self.readings().iter().zip(self.sensors).filter_map(|(reading, sensor)| match reading.echo {
+            Echo::Range(range) => Some(Ranged {
+                sensor,
+                range,
+                mount: [reading.mount_x, reading.mount_y],
+                bearing: reading.bearing_rad,
+            }),
+            Echo::Nothing => None,
+        })
     }
 }
 

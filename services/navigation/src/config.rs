@@ -49,7 +49,7 @@ impl Default for NavigationConfig {
             cruise_m_s: 0.0,
             door_m_s: 0.4,
             turn_rad_s: 1.0,
-            scan_deg: 12.0,
+            scan_deg: 6.0,
             scan_s: 2.4,
             look_ahead_m: 1.0,
             narrow_m: 0.7,

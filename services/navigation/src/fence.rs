@@ -112,3 +112,42 @@ fn wall(scene: &Scene<'_>, ux: f32, uy: f32) -> f32 {
     }
     f32::INFINITY
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gaps by direction in steps of 15 degrees; elsewhere nothing is near.
+    fn fence(gaps: &[(usize, f32)]) -> Fence {
+        let mut sides = [(0.0, 0.0, f32::INFINITY); DIRECTIONS];
+        for (i, side) in sides.iter_mut().enumerate() {
+            let (sin, cos) = (i as f32 * TAU / DIRECTIONS as f32).sin_cos();
+            let gap = gaps.iter().find(|(at, _)| *at == i).map_or(f32::INFINITY, |(_, gap)| *gap);
+            *side = (cos, sin, gap);
+        }
+        let least_m = gaps.iter().fold(f32::INFINITY, |least, (_, gap)| least.min(*gap));
+        Fence { sides, least_m, unmapped_m: f32::INFINITY }
+    }
+
+    #[test]
+    fn the_speed_towards_something_falls_with_the_gap_and_along_it_does_not() {
+        let ((vx, vy), near) = fence(&[(0, 0.35)]).keep((0.5, 0.3));
+        assert!((vx - GAIN_PER_S * (0.35 - KEEP_M)).abs() < 1e-5 && (vy - 0.3).abs() < 1e-5 && !near);
+        assert_eq!(fence(&[]).keep((0.5, 0.3)), ((0.5, 0.3), false));
+    }
+
+    #[test]
+    fn what_is_too_near_is_left_even_without_a_wish() {
+        let ((vx, vy), near) = fence(&[(0, 0.05)]).keep((0.0, 0.0));
+        assert!((-AWAY_M_S..-0.05).contains(&vx) && vy.abs() < 1e-5 && near, "{vx} {vy}");
+        let ((vx, _), _) = fence(&[(0, -1.0)]).keep((0.5, 0.0));
+        assert!((vx + AWAY_M_S).abs() < 1e-5, "never faster away than allowed: {vx}");
+    }
+
+    #[test]
+    fn between_the_posts_of_a_door_the_way_on_stays_open() {
+        // 0.225 m to either side, nothing ahead.
+        let ((vx, vy), near) = fence(&[(6, 0.225), (18, 0.225)]).keep((0.4, 0.2));
+        assert!((vx - 0.4).abs() < 1e-4 && vy <= GAIN_PER_S * (0.225 - KEEP_M) + 1e-4 && !near, "{vx} {vy}");
+    }
+}

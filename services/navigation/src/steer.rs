@@ -215,15 +215,22 @@ impl Steering {
         if !self.heading.is_finite() {
             self.heading = place.heading;
         }
+        let free = |direction: f32| {
+            let half_width = self.craft.radius_m + SWATH_MARGIN_M;
+            let from = (place.x, place.y);
+            free_length(scene.cells, &scene.window, from, direction, half_width, SWATH_M, STANDS_CERTAINTY)
+        };
         let (target_rad, target_m) = aim.map_or((f32::NAN, f32::NAN), |aim| {
             ((aim.y - place.y).atan2(aim.x - place.x), place.distance((aim.x, aim.y)))
         });
+        let on_line = free(target_rad);
         let decision = self.vfh.decide(
             &Situation {
                 cells: scene.cells,
                 walls: scene.walls,
                 target_rad,
-                target_m,
+                // What stands on the way is gone round first: the walls behind it close no way past it.
+                target_m: target_m.min(on_line),
                 max_speed_m_s: self.craft.cruise_m_s,
             },
             histogram,
@@ -242,17 +249,11 @@ impl Steering {
             (steer.velocity, _) = Fence::around(scene, self.craft.radius_m).keep((0.0, 0.0));
             return steer;
         };
-        let free = |direction: f32| {
-            let half_width = self.craft.radius_m + SWATH_MARGIN_M;
-            let from = (place.x, place.y);
-            free_length(scene.cells, &scene.window, from, direction, half_width, SWATH_M, STANDS_CERTAINTY)
-        };
         let reserve = self.craft.radius_m + config.stop_gap_m;
         let wanted = if self.blocked { FREE_AGAIN_M } else { WORTH_M };
         // Between mapped walls the planned line is known to 3 cm, and the valley is only a few sectors wide:
         // the line is flown while nothing stands on it.
         let narrow = aim.route_m < config.narrow_m && aim.aside_m < ON_ROUTE_M;
-        let on_line = free(target_rad);
         let (direction, speed, reason, free_m) = match decision.direction_rad {
             _ if narrow && on_line - reserve > wanted => {
                 (target_rad, self.craft.cruise_m_s, SteeringReason::TargetSafe, on_line)

@@ -92,7 +92,7 @@ fn groups_follow_each_other_and_every_sensor_has_its_turn() {
         "the datasheet's 60 ms, less the tick's jitter"
     );
     let masks: Vec<u32> = pings.iter().take(5).map(|p| p.1).collect();
-    assert_eq!(masks, [0b1_0001_0001, 0b1_0010_0010, 0b1_0100_0100, 0b1_1000_1000, 0b1_0001_0001]);
+    assert_eq!(masks, [0b1_0001_0001, 0b1_0010_0010, 0b1_1000_1000, 0b1_0100_0100, 0b1_0001_0001]);
     let last = ranges.last().unwrap();
     assert_eq!((last.count, last.sensors), (3, 9));
     assert!((last.sweep_s - 0.24).abs() < 1e-6);
@@ -152,7 +152,7 @@ fn echoes_that_make_no_sense_are_refused_and_counted() {
 fn a_vehicle_that_would_hear_itself_is_refused() {
     let vehicle = VEHICLE.replacen("group = 1", "group = 0", 1);
     let error = Bench::new(&vehicle).err().unwrap().to_string();
-    assert!(error.contains("front") && error.contains("45 degrees"), "{error}");
+    assert!(error.contains("front") && error.contains("35 degrees"), "{error}");
 }
 
 #[test]

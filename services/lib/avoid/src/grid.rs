@@ -99,8 +99,7 @@ pub const UNITS_PER_READING: u8 = 8;
 impl Default for GridRules {
     /// The `flight` configuration: six readings saturate, so that what moved on is cleared by a handful of
     /// pings (about 2 s at 4 Hz a sensor); a full cell is forgotten in 32 s, because who stands between two cones
-    /// is heard by neither; an echo from behind takes three
-    /// quarters of a reading away.
+    /// is heard by neither; an echo from behind takes three quarters of a reading away.
     fn default() -> Self {
         Self {
             reading: UNITS_PER_READING,

@@ -67,7 +67,7 @@ impl VfhConfig {
             slow_density: 5.0,
             straight_at_target: true,
             continuity: 4,
-            max_detour_rad: 110.0_f32.to_radians(),
+            max_detour_rad: 75.0_f32.to_radians(),
         }
     }
 

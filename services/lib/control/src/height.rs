@@ -85,14 +85,17 @@ const MEMORY: usize = 32;
 const MAX_BIAS_M_S2: f32 = 3.5;
 /// Period of a reading from which the gate starts to widen, seconds.
 const USUAL_PERIOD_S: f32 = 0.06;
-/// Errors that grow so often in a row, and to so much, are a motion of the drone, metres: over a soft chair echoes
-/// come 2 to 10 cm late, and grow by chance.
+/// Errors that grow so often in a row, and to so much, are a fall of the drone, metres: over a soft chair echoes come
+/// 2 to 10 cm late, and grow by chance. Only towards the ground: nothing throws a drone up faster than its thrust
+/// explains, but the far side of a plant or chair falls away from under it in just such readings.
 const JOLT_READINGS: u32 = 2;
 const JOLT_M: f32 = 0.15;
 /// Levels that differ by less are the same, metres.
 const SAME_LEVEL_M: f32 = 0.06;
 /// A thing so thin is flown over like the floor, metres; estimates of the level drift by less.
 const THIN_M: f32 = 0.15;
+/// With so much room below a level may be forgotten without harm, metres: the seat of a chair at flying height leaves 0.75.
+const ROOMY_M: f32 = 0.8;
 /// How fast a level that cannot be (below the floor) or does not matter (thin) is forgotten, m/s.
 const FORGET_M_S: f32 = 0.04;
 
@@ -171,7 +174,8 @@ impl HeightEstimator {
             // Nothing lies below the floor: the estimate of the height was too low, and comes up slowly.
             let up = (FORGET_M_S * dt).min(-self.surface_m);
             self.lift_all(up, up);
-        } else if self.surface_m < THIN_M {
+        } else if self.surface_m < THIN_M || self.clearance_m() > ROOMY_M {
+            // What is thin does not matter; what is far below and stays is the floor, and the height was wrong.
             let down = (0.5 * FORGET_M_S * dt).min(self.surface_m);
             self.lift_all(-down, -down);
         }
@@ -228,7 +232,7 @@ impl HeightEstimator {
         let last = self.doubt;
         let recent = last.count > 0 && seconds(last.at_ns, at_ns) < 0.4;
         let agrees = recent && (level - last.level_m).abs() < SAME_LEVEL_M;
-        // A fall or a leap that the thrust does not explain grows from reading to reading; an edge does not.
+        // A fall that the thrust does not explain grows from reading to reading; an edge does not.
         let grows = recent && !agrees && error * last.error_m > 0.0 && error.abs() > last.error_m.abs();
         self.doubt = Doubt {
             count: if agrees { last.count + 1 } else { 1 },
@@ -237,7 +241,7 @@ impl HeightEstimator {
             error_m: error,
             at_ns,
         };
-        if self.doubt.growing >= JOLT_READINGS && error.abs() > JOLT_M {
+        if self.doubt.growing >= JOLT_READINGS && error < -JOLT_M {
             let climb = (error - last.error_m) / seconds(last.at_ns, at_ns).max(0.02);
             self.doubt = Doubt::default();
             self.last_echo_ns = at_ns;

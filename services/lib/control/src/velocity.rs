@@ -37,7 +37,7 @@ impl Default for VelocityConfig {
     fn default() -> Self {
         Self {
             gain_per_s: 4.0,
-            integral_per_s2: 3.0,
+            integral_per_s2: 1.5,
             response_s: 0.2,
             max_disturbance_m_s2: 0.8,
             max_tilt_deg: 10.0,

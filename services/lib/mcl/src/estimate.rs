@@ -67,6 +67,13 @@ impl Estimate {
         let half = 0.5 * (self.variance_x - self.variance_y);
         (mean - half.hypot(self.covariance_xy)).max(0.0).sqrt()
     }
+
+    /// The same with at least this much doubt.
+    pub(crate) fn doubted(mut self, p_lost: f32) -> Self {
+        self.p_lost = self.p_lost.max(p_lost);
+        self.state = state(self.p_lost, self.sigma(), self.share);
+        self
+    }
 }
 
 /// The state that goes with a doubt and a spread: tracking while the place is believed to half a metre
@@ -193,9 +200,9 @@ impl Summary {
     }
 
     /// Sums up a set of normalised weights. A set whose weights or values do not add up gives an
-    /// estimate that is lost. Also returns the area in which the *whole* set lives, as standard
+    /// estimate that is lost; otherwise only a set of several clusters is doubted here. Also returns the area in which the *whole* set lives, as standard
     /// deviations along and across.
-    pub(crate) fn of(&mut self, p: &ParticlesRef<'_>, p_lost: f32) -> (Estimate, [f32; 2]) {
+    pub(crate) fn of(&mut self, p: &ParticlesRef<'_>) -> (Estimate, [f32; 2]) {
         let origin = [
             p.x.first(),
             p.y.first(),
@@ -212,7 +219,7 @@ impl Summary {
         } else {
             0.0
         };
-        let mut estimate = describe(&all, &origin, p_lost, effective, 1.0);
+        let mut estimate = describe(&all, &origin, 0.0, effective, 1.0);
         let spread = [estimate.sigma(), estimate.sigma_across()];
         if spread[0] > WIDE_M {
             let (mut cx, mut cy) = self.peak(p);
@@ -221,7 +228,7 @@ impl Summary {
                 let main = moments(p, &origin, Some((cx, cy, CLUSTER_M)));
                 if main.weight > 0.0 {
                     let share = (main.weight / all.weight) as f32;
-                    estimate = describe(&main, &origin, p_lost.max(1.0 - share), effective, share);
+                    estimate = describe(&main, &origin, 1.0 - share, effective, share);
                     (cx, cy) = (estimate.x, estimate.y);
                 }
             }

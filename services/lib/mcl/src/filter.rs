@@ -153,7 +153,8 @@ impl<M: RangeMap> Filter<M> {
             block.weight.fill(1.0 / count as f32);
             from = to;
         }
-        let (estimate, spread) = self.summary.of(&next.written(count), start.p_lost.clamp(0.0, 1.0));
+        let (estimate, spread) = self.summary.of(&next.written(count));
+        let estimate = estimate.doubted(start.p_lost.clamp(0.0, 1.0));
         let memory = Memory {
             p_lost: start.p_lost.clamp(0.0, 1.0),
             effective: estimate.effective,
@@ -224,16 +225,21 @@ impl<M: RangeMap> Filter<M> {
         } else {
             next.weight[..count].fill(1.0 / count.max(1) as f32);
         }
+        let (estimate, spread) = self.summary.of(&next.written(count));
         let doubt = if !sound {
             1.0
-        } else if sweep.is_some() {
-            self.config.trust.step(memory.p_lost, motion.dt_s, self.beams.evidence(prior))
+        } else if let Some(sweep) = sweep {
+            let heard =
+                self.compared(sweep, &estimate).map(|(_, range, expected, sigmas)| range < expected - sigmas);
+            let evidence =
+                self.beams.evidence(prior).zip(heard).map(|((set, blind), short)| (set, blind, short));
+            self.config.trust.step(memory.p_lost, motion.dt_s, evidence)
         } else if motion.grounded {
             memory.p_lost
         } else {
             self.config.trust.step(memory.p_lost, motion.dt_s, core::iter::empty())
         };
-        let (estimate, spread) = self.summary.of(&next.written(count), doubt);
+        let estimate = estimate.doubted(doubt);
         let memory =
             Memory { p_lost: doubt, effective: estimate.effective, wanted: self.wanted(&estimate, spread) };
         let fits = sweep.map_or(0, |s| self.fits(s, &estimate));
@@ -273,24 +279,34 @@ impl<M: RangeMap> Filter<M> {
         if wanted.is_finite() { wanted.clamp(p.min as f32, p.max as f32) } else { p.max as f32 }
     }
 
-    fn fits(&self, sweep: &Sweep<'_>, e: &Estimate) -> u32 {
+    /// Each reading that says something about walls: its index, its range (infinite: silence), what the plan has
+    /// at the estimated place, and three sigma of the sensor and of the place.
+    fn compared<'s>(
+        &'s self,
+        sweep: &'s Sweep<'_>,
+        e: &'s Estimate,
+    ) -> impl Iterator<Item = (usize, f32, f32, f32)> + 's {
         let model = self.beams.model();
         let heading = sweep.yaw_rad + e.heading_offset;
         let (sin, cos) = heading.sin_cos();
-        let mut fits = 0;
-        for (i, r) in sweep.readings.iter().take(crate::MAX_READINGS).enumerate() {
-            let Some(Echo::Range(z)) = model.levelled(r, sweep) else { continue };
+        sweep.readings.iter().take(crate::MAX_READINGS).enumerate().filter_map(move |(i, r)| {
+            let range = match model.levelled(r, sweep)? {
+                Echo::Range(range) => range,
+                Echo::Nothing => f32::INFINITY,
+            };
             let expected = self.map.range(
                 e.x + cos * r.mount_x - sin * r.mount_y,
                 e.y + sin * r.mount_x + cos * r.mount_y,
                 heading + r.bearing_rad,
             );
-            // Three sigma of the sensor and of the place.
-            if (z - expected).abs() < 3.0 * model.sigma(z).hypot(e.sigma()) {
-                fits |= 1 << i;
-            }
-        }
-        fits
+            Some((i, range, expected, 3.0 * model.sigma(range.min(expected)).hypot(e.sigma())))
+        })
+    }
+
+    fn fits(&self, sweep: &Sweep<'_>, e: &Estimate) -> u32 {
+        self.compared(sweep, e)
+            .filter(|(_, range, expected, sigmas)| (range - expected).abs() < *sigmas)
+            .fold(0, |fits, (i, ..)| fits | 1 << i)
     }
 }
 

@@ -9,6 +9,10 @@ pub struct TrustConfig {
     pub temper: f32,
     /// Most that one reading can raise the log odds.
     pub raise: f32,
+    /// The same for a reading that is shorter than the plan has it at the set's place: there may stand something that
+    /// the plan does not show, and beside it a drone is not lost. Where nothing stands, walls hide nothing: what
+    /// is too long speaks for itself.
+    pub raise_short: f32,
     /// Most that one reading can lower them. Less than `raise`: a place that is not the true one still
     /// fits about half of the readings, and the true one fits more than three in five among clutter.
     pub lower: f32,
@@ -20,7 +24,14 @@ pub struct TrustConfig {
 
 impl Default for TrustConfig {
     fn default() -> Self {
-        Self { temper: 0.25, raise: 0.4, lower: 0.25, hazard_per_s: 0.005, recovery_per_s: 0.01 }
+        Self {
+            temper: 0.25,
+            raise: 0.4,
+            raise_short: 0.15,
+            lower: 0.2,
+            hazard_per_s: 0.005,
+            recovery_per_s: 0.01,
+        }
     }
 }
 
@@ -28,24 +39,26 @@ impl TrustConfig {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         within("trust.temper", self.temper, 0.01..=1.0)?;
         within("trust.raise", self.raise, 0.01..=5.0)?;
+        within("trust.raise_short", self.raise_short, 0.0..=5.0)?;
         within("trust.lower", self.lower, 0.01..=5.0)?;
         within("trust.hazard_per_s", self.hazard_per_s, 1e-6..=0.5)?;
         within("trust.recovery_per_s", self.recovery_per_s, 1e-6..=0.5)
     }
 
     /// P(lost) after `dt` seconds and readings with the given (likelihood by the set, likelihood to one
-    /// who does not know the place): a two-state hidden Markov chain. Where the readings fit the set
+    /// who does not know the place, whether it is too short): a two-state hidden Markov chain. Where the readings fit the set
     /// better than they fit any place, doubt falls; unmapped things raise it by a bounded amount each.
-    pub(crate) fn step(&self, p_lost: f32, dt: f32, evidence: impl Iterator<Item = (f32, f32)>) -> f32 {
+    pub(crate) fn step(&self, p_lost: f32, dt: f32, evidence: impl Iterator<Item = (f32, f32, bool)>) -> f32 {
         let p = if (0.0..=1.0).contains(&p_lost) { p_lost } else { 0.5 };
         let dt = dt.clamp(0.0, 5.0);
         let p = p + (1.0 - p) * (self.hazard_per_s * dt).min(0.5) - p * (self.recovery_per_s * dt).min(0.5);
         let p = p.clamp(1e-6, 1.0 - 1e-6);
         let mut odds = (p / (1.0 - p)).ln();
-        for (by_set, blind) in evidence {
+        for (by_set, blind, short) in evidence {
+            let raise = if short { self.raise_short } else { self.raise };
             let ratio = (blind.max(1e-6) / by_set.max(1e-6)).ln() * self.temper;
             // NaN (a broken set) counts as the worst reading.
-            odds += if ratio.is_nan() { self.raise } else { ratio.clamp(-self.lower, self.raise) };
+            odds += if ratio.is_nan() { self.raise } else { ratio.clamp(-self.lower, raise) };
         }
         1.0 / (1.0 + (-odds).exp())
     }
@@ -56,13 +69,14 @@ mod tests {
     use super::TrustConfig;
 
     /// One pair of readings each 60 ms, as (by the set, blind).
-    fn after(seconds: f32, pair: [(f32, f32); 2]) -> f32 {
+    fn after(seconds: f32, pair: [(f32, f32, bool); 2]) -> f32 {
         let t = TrustConfig::default();
         (0..(seconds / 0.06) as usize).fold(0.01, |p, _| t.step(p, 0.06, pair.into_iter()))
     }
 
-    const HIT: (f32, f32) = (4.0, 0.3);
-    const WRONG: (f32, f32) = (0.05, 0.3);
+    const HIT: (f32, f32, bool) = (4.0, 0.3, false);
+    const WRONG: (f32, f32, bool) = (0.05, 0.3, false);
+    const SHORT: (f32, f32, bool) = (0.05, 0.3, true);
 
     #[test]
     fn doubt_follows_the_readings() {
@@ -73,13 +87,15 @@ mod tests {
         }));
         assert!(clutter < 0.05, "three in ten readings hit unmapped things: {clutter}");
         assert!(after(3.0, [WRONG, WRONG]) > 0.9, "nothing fits for three seconds");
+        assert!(after(60.0, [HIT, SHORT]) < 0.01, "half of the readings hit unmapped things for a minute");
+        assert!(after(10.0, [SHORT, SHORT]) > 0.9, "nothing fits for ten seconds");
         assert!(after(0.3, [WRONG, WRONG]) < 0.5, "a third of a second is a person passing");
     }
 
     #[test]
     fn broken_evidence_is_doubt() {
         let t = TrustConfig::default();
-        assert!(t.step(0.1, 0.06, [(f32::NAN, 0.3)].into_iter()) > 0.1);
+        assert!(t.step(0.1, 0.06, [(f32::NAN, 0.3, false)].into_iter()) > 0.1);
         assert!((0.0..=1.0).contains(&t.step(f32::NAN, f32::NAN, [HIT].into_iter())));
     }
 }
