@@ -4,7 +4,7 @@ use crate::config::parse_config;
 use crate::device::Devices;
 use crate::notify::Notifier;
 use crate::port::{BusKind, StepContext};
-use crate::shm::{RunDir, SharedNode};
+use crate::shm::{RunDir, SharedNode, woken_within};
 use crate::{Cache, Input, Output, Ports, Service, Start, StartError, fnv};
 use ipc_types::{Health, MAX_PORTS, Message, Text, Trace};
 use manifest::Manifest;
@@ -175,14 +175,7 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
     while !stop.load(Ordering::Relaxed) {
         let now = monotonic_ns();
         let due = next_tick.min(next_heartbeat);
-        let mut woken = false;
-        if now < due {
-            let wait = Duration::from_nanos(due - now);
-            // An interrupted wait is a signal: the loop looks at `stop` next.
-            let _ = listener.timed_wait(|_| woken = true, wait);
-        } else {
-            let _ = listener.try_wait(|_| woken = true);
-        }
+        let woken = woken_within(&listener, due.saturating_sub(now));
         let now = monotonic_ns();
         let lateness = now.saturating_sub(next_tick);
         if woken || now >= next_tick {

@@ -296,6 +296,39 @@ fn a_fall_is_believed_although_it_is_faster_than_thrust_explains() {
 }
 
 #[test]
+fn low_steps_between_lost_echoes_are_no_motion() {
+    // Books on a table: 11 cm, little more than the gate, and half of the echoes lost.
+    for seed in 0..10 {
+        let mut flight = Flight::hovering(1450.0, 1.2, seed);
+        flight.plant.surface = 0.75;
+        flight.hold(1.2, 4.0);
+        flight.lost = 0.5;
+        for k in 0..8 {
+            flight.plant.surface = if k % 2 == 0 { 0.86 } else { 0.75 };
+            let worst = flight.hold(1.2, 1.5);
+            assert!(worst < 0.25, "seed {seed}, step {k}: {worst}");
+        }
+    }
+}
+
+#[test]
+fn a_leap_is_believed_although_it_is_faster_than_thrust_explains() {
+    // 1.2 m/s upwards within a quarter of a second, over a table that begins just then.
+    for seed in 0..6 {
+        let mut flight = Flight::hovering(1450.0, 1.2, seed);
+        flight.hold(1.2, 3.0);
+        flight.plant.surface = 0.4;
+        flight.push = 5.0;
+        let mut worst = flight.hold(1.2, 0.24);
+        flight.push = 0.0;
+        worst = worst.max(flight.hold(1.2, 6.0));
+        assert!(worst < 0.8, "seed {seed}: {worst}");
+        let late = flight.hold(1.2, 2.0);
+        assert!(late < 0.2, "seed {seed}: {late}, surface {}", flight.estimate.surface_m());
+    }
+}
+
+#[test]
 fn a_whole_flight_from_floor_to_floor() {
     for (seed, hover, guess) in
         [(1, 1380.0, 1480.0), (2, 1450.0, 1450.0), (3, 1520.0, 1430.0), (4, 1600.0, 1500.0)]

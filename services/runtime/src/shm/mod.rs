@@ -9,8 +9,10 @@ mod names;
 mod node;
 mod payload;
 mod ports;
+mod wait;
 
 pub use holder::{Holder, ShmError};
 pub use names::RunDir;
 pub(crate) use node::SharedNode;
 pub(crate) use ports::{SharedInput, SharedLoan, SharedOutput, SharedSample};
+pub(crate) use wait::woken_within;
