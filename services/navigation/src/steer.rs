@@ -26,6 +26,8 @@ const SWATH_MARGIN_M: f32 = 0.05;
 const SWATH_M: f32 = 1.6;
 /// Deceleration counted on for stopping, metres a second squared: half of what FACTS 2 allows.
 const BRAKE_M_S2: f32 = 0.8;
+/// From an echo to the first braking, seconds: decision, link and the tilt's own time (FACTS 2: 0.35 beside the sweep).
+const REACTION_S: f32 = 0.35;
 /// Growth of the wished speed, metres a second squared: small tilts keep the attitude filter honest (FACTS 1).
 const SPEED_UP_M_S2: f32 = 0.6;
 /// Clearance of the plan at and above which the full speed is flown, metres.
@@ -272,7 +274,7 @@ impl Steering {
         self.turn(config, scene.dt_s, direction);
         steer.heading = wrap(self.heading + scan(config, scene.now));
         let mut speed = if self.blocked { 0.0 } else { speed };
-        speed = speed.min((2.0 * BRAKE_M_S2 * gap.max(0.0)).sqrt());
+        speed = speed.min(stoppable_within(gap));
         speed = speed.min(self.speed_for(config, aim.clearance_m));
         speed = speed.min((0.7 * aim.remaining_m).max(CREEP_M_S));
         let unsure = ((place.sigma - SURE_M) / UNSURE_OVER_M).clamp(0.0, 1.0 - LEAST_SHARE);
@@ -317,6 +319,12 @@ impl Steering {
         let share = ((clearance - DOOR_M) / (OPEN_M - DOOR_M)).clamp(0.0, 1.0);
         door + share * (self.craft.cruise_m_s - door)
     }
+}
+
+/// Speed from which the drone stops within a gap, metres a second: d = v t + v²/2a (FACTS 2).
+fn stoppable_within(gap: f32) -> f32 {
+    let away = BRAKE_M_S2 * REACTION_S;
+    (away * away + 2.0 * BRAKE_M_S2 * gap.max(0.0)).sqrt() - away
 }
 
 /// How far the heading is swept aside now, radians.

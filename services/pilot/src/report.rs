@@ -38,6 +38,12 @@ pub(crate) fn cause(cause: Cause) -> FailsafeCause {
 }
 
 impl PilotCore {
+    /// The throttle that holds the drone now: the learned one, less what thrust does more than it should (more
+    /// right after a take-off than one that was learned only in part).
+    fn holding_us(&self) -> f32 {
+        self.climb.balancing_us(self.height.bias_m_s2())
+    }
+
     /// Writes the channels of the last step, every field but the header.
     pub fn write_channels(&self, now: u64, out: &mut Channels) {
         let d = &self.decided;
@@ -55,7 +61,7 @@ impl PilotCore {
         out.arm = u8::from(d.arm);
         out.level_roll_us = stick::of_angle(self.trim.roll);
         out.level_pitch_us = stick::of_angle(self.trim.pitch);
-        out.hover_throttle_us = if self.hover_known { self.climb.hover_us() } else { f32::NAN };
+        out.hover_throttle_us = if self.hover_known { self.holding_us() } else { f32::NAN };
         let height_known =
             !self.airborne() || self.height.silent_s(now) < self.config.failsafe.height_descend_s;
         out.height_m = if height_known { self.height.height_m() } else { f32::NAN };
@@ -80,7 +86,7 @@ impl PilotCore {
         out.if_height_lost = action(self.what_if(|e| e.height_silent_s = policy.height_descend_s)).code();
         out.on_ground = u8::from(!self.airborne());
         out.arm = u8::from(self.decided.arm);
-        out.hover_throttle_us = if self.hover_known { self.climb.hover_us() } else { nowhere };
+        out.hover_throttle_us = if self.hover_known { self.holding_us() } else { nowhere };
         out.level_roll_us = stick::of_angle(self.trim.roll);
         out.level_pitch_us = stick::of_angle(self.trim.pitch);
         out.height_m = self.height.height_m();

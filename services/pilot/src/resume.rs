@@ -4,6 +4,9 @@ use crate::core::PilotCore;
 use control::{SpoolUp, Tilt, Vector, stick};
 use ipc_types::{Phase, PilotState};
 
+/// A climb is reckoned on for at most so long, seconds: a restart takes a tenth of it.
+const LONGEST_AWAY_S: f64 = 0.5;
+
 impl PilotCore {
     /// Goes on from the last state that the pilot published before it died. `now` is the time of the first
     /// step. A state that makes no sense is not used.
@@ -26,7 +29,9 @@ impl PilotCore {
         self.hold = Vector::new(state.hold_x_m, state.hold_y_m).known();
         self.operator_land = state.cause == ipc_types::FailsafeCause::Operator.code();
         self.last_step_ns = Some(now);
-        self.height.set(now, state.height_m, state.climb_m_s, state.surface_m);
+        // It went on climbing meanwhile.
+        let age_s = ipc_types::seconds_between(state.header.stamp_ns, now).clamp(0.0, LONGEST_AWAY_S) as f32;
+        self.height.set(now, state.height_m + state.climb_m_s * age_s, state.climb_m_s, state.surface_m);
         self.climb.set_throttle(self.climb.hover_us());
         self.hover_known = true;
         let flying = state.on_ground == 0;

@@ -111,6 +111,14 @@ impl ClimbController {
         self.hover_us
     }
 
+    /// Throttle, microseconds, at which a drone hovers that accelerates by `bias_m_s2` at the learned one.
+    #[must_use]
+    pub fn balancing_us(&self, bias_m_s2: f32) -> f32 {
+        let load = (1.0 - bias_m_s2 / GRAVITY_M_S2).clamp(0.5, 1.5);
+        let us = IDLE_US + (self.hover_us - IDLE_US) * load.sqrt();
+        if us.is_finite() { us.clamp(HOVER_RANGE_US[0], HOVER_RANGE_US[1]) } else { self.hover_us }
+    }
+
     /// The throttle commanded last, microseconds.
     #[must_use]
     pub fn throttle_us(&self) -> f32 {

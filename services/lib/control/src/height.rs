@@ -281,8 +281,10 @@ impl HeightEstimator {
         let silent = if self.doubts.count > 0 { 0.0 } else { gap - SILENCE_S };
         let gate = self.config.gate_m + self.config.gate_growth_m_s2 * silent.clamp(0.0, 1.0).powi(2);
         if error.abs() <= gate {
+            // What was doubted shortly before did not drift there since the last echo that fitted.
+            let since = self.doubts.last().map_or(gap, |(at, _)| gap.min(seconds(at, at_ns)));
             self.doubts = Doubts::default();
-            self.correct(at_ns, gap, error);
+            self.correct(at_ns, since, error);
             return Echo::Used;
         }
         self.doubted(at_ns, error)

@@ -187,6 +187,7 @@ impl Rig {
             self.core.write_channels(self.now, &mut self.channels);
         }
         self.core.write_state(&mut self.state);
+        self.state.header.stamp_ns = self.now;
         self.check();
         self.fly();
     }
