@@ -254,3 +254,15 @@ proptest! {
         prop_assert!(site.map.clearance(x, y) >= 0.0);
     }
 }
+
+#[test]
+fn a_route_comes_up_to_a_door_from_the_front_and_passes_its_middle() {
+    // The door of store 1 is 0.9 m wide around (1.65, 3.15); both ends of the route lie well aside of it.
+    let site = stores();
+    let points = route(&site, (6.5, 2.2), (3.2, 5.0)).unwrap();
+    let passed: Vec<_> = along(&points).into_iter().filter(|p| (p.1 - 3.15).abs() < 0.3).collect();
+    assert!(passed.len() > 4, "{points:?}");
+    for (x, y) in passed {
+        assert!((x - 1.65).abs() < 0.06, "at {x} {y}: {points:?}");
+    }
+}
