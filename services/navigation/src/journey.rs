@@ -26,6 +26,8 @@ pub(crate) const SAME_STOP_M: f32 = 0.6;
 pub(crate) const MAX_GIVEN_UP: usize = 64;
 /// Planning that failed is tried again with a clean slate this often.
 const FRESH_STARTS: u32 = 4;
+/// So often in a round what stood in the way is believed to have moved on, when nothing is left to see but behind it.
+const AMNESTIES: u32 = 3;
 /// Marks nearer to the drone than this are forgotten when it is walled in by them, metres.
 const FORGET_M: f32 = 1.0;
 /// Work slices between two looks whether the next stops are still worth the way: once a second.
@@ -100,6 +102,7 @@ pub struct Journey {
     pub(crate) tries: u32,
     pub(crate) given_up: Vec<(f32, f32)>,
     fresh_starts: u32,
+    amnesties: u32,
     pub(crate) since_trim: u32,
     pub(crate) round: bool,
     trouble: Text<64>,
@@ -132,6 +135,7 @@ impl Journey {
             tries: 0,
             given_up: Vec::with_capacity(MAX_GIVEN_UP),
             fresh_starts: 0,
+            amnesties: 0,
             since_trim: 0,
             round: false,
             trouble: Text::default(),
@@ -149,6 +153,7 @@ impl Journey {
         self.reasons.fill(Text::default());
         self.given_up.clear();
         self.tries = 0;
+        self.amnesties = 0;
         self.looks.clear();
         self.seen_before.clear();
         self.review = false;
@@ -337,6 +342,14 @@ impl Journey {
                 };
                 self.stops.clear();
                 self.stops.extend(round.stops().iter().filter(wanted));
+                let behind = round.rooms().iter().any(|room| room.skipped == Some(Obstacle::Unmapped));
+                if behind && self.amnesties < AMNESTIES && !self.stops.iter().any(|stop| stop.look) {
+                    // People walk on: before the round is cut short, the way is tried again.
+                    self.amnesties += 1;
+                    self.map.set_unmapped(&Bits::default());
+                    self.stage = Stage::Asked;
+                    return Work::Busy;
+                }
                 self.begin_leg(0, (place.x, place.y))
             }
         }

@@ -238,7 +238,7 @@ fn obstacle(map: &Costmap, start: usize, path: &[usize]) -> Option<Obstacle> {
     if let Some(door) = bad.iter().find_map(|cell| map.shut_door(*cell)) {
         return Some(Obstacle::DoorClosed(door));
     }
-    let narrow = bad.iter().copied().filter(|cell| !map.is_obstructed(*cell));
+    let narrow = bad.iter().copied().filter(|cell| map.is_narrow(*cell) && !map.is_obstructed(*cell));
     Some(match narrow.min_by(|a, b| map.mapped(*a).total_cmp(&map.mapped(*b))) {
         Some(cell) => {
             Obstacle::Narrow { width_m: map.passage_width(cell), needed_m: 2.0 * map.limits().clearance_m() }
