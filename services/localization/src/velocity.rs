@@ -3,7 +3,8 @@
 //! The particle set averages over many pings: its velocity follows a gust late, and a loop that flies by it sways.
 //! This filter carries place, velocity and what the air does (a first-order gust, the Dryden shape) from one
 //! measurement to the next by the measured tilt. Optical flow, when there is any, measures the velocity within a
-//! frame; the particles' place, which the walls hold fast, keeps it right where the floor shows nothing.
+//! frame; where the floor shows nothing, the change of a wall's range between two pings measures it along the wall's
+//! normal. The particles' place, which the walls hold fast, keeps the sum right.
 
 use crate::attitude::{Attitudes, seconds};
 use crate::flow::Frame;

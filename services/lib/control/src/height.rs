@@ -2,8 +2,8 @@
 //!
 //! The state is height of the skids above the floor, climb rate and the acceleration that the thrust model
 //! does not explain. It is carried forward by the commanded thrust and corrected by echoes at the time that
-//! they left the ground (a short memory of past heights). A jump of the reading is never a jump of the drone:
-//! it becomes a change of `surface`, the level of what is below.
+//! they left the ground (a short memory of past heights). Readings that do not fit are collected until they lie on
+//! a line: a level one is a change of `surface`, the level of what is below; a steep one is the drone's own motion.
 
 use crate::check::{RangeError, within};
 use crate::held::seconds;
@@ -49,7 +49,7 @@ impl HeightConfig {
         within("height.bandwidth_rad_s", self.bandwidth_rad_s, 1.0, 8.0)?;
         within("height.gate_m", self.gate_m, 0.03, 0.3)?;
         within("height.gate_growth_m_s2", self.gate_growth_m_s2, 0.0, 2.0)?;
-        within("height.step_readings", self.step_readings as f32, 2.0, 8.0)?;
+        within("height.step_readings", self.step_readings as f32, 3.0, DOUBTS as f32)?;
         within("height.cone_half_angle_deg", self.cone_half_angle_deg, 0.0, 40.0)?;
         within("height.max_tilt_deg", self.max_tilt_deg, 15.0, 45.0)
     }
