@@ -101,6 +101,8 @@ message! {
     pub struct FlowMotion on "flow/motion" {
         /// Middle of the interval that was integrated.
         pub sampled_ns: u64,
+        /// When the range was measured; 0 without one.
+        pub ranged_ns: u64,
         /// Velocity of the body over the ground, body frame forward, levelled, compensated for tilt rates.
         /// NaN when the quality gate refused the frame.
         pub velocity_x_m_s: f32,

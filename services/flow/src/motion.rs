@@ -184,6 +184,7 @@ impl Motion {
         let (raw_x, raw_y) = (cos * x - sin * y, sin * x + cos * y);
         let mut motion = FlowMotion {
             sampled_ns: start_ns + period_ns / 2,
+            ranged_ns: self.range.map_or(0, |(heard_ns, _)| heard_ns.saturating_sub(ON_THE_WAY_NS)),
             velocity_x_m_s: f32::NAN,
             velocity_y_m_s: f32::NAN,
             sigma_m_s: f32::NAN,

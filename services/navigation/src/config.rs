@@ -53,7 +53,7 @@ impl Default for NavigationConfig {
             scan_s: 2.4,
             look_ahead_m: 1.0,
             narrow_m: 0.7,
-            stop_gap_m: 0.25,
+            stop_gap_m: 0.6,
             wait_s: 4.0,
             stuck_s: 12.0,
             tries: 3,

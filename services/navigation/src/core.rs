@@ -61,13 +61,13 @@ impl Core {
         atlas: Arc<Atlas>,
     ) -> Result<Self, avoid::ConfigError> {
         Ok(Self {
+            senses: Senses::new(craft.radius_m),
             steering: Steering::new(craft)?,
             mission: Mission::new(atlas.pad()),
             journey: Journey::new(Arc::clone(&atlas), config.tries),
             config,
             atlas,
             place: None,
-            senses: Senses::default(),
             beams: Vec::with_capacity(MAX_BEAMS),
             rules: GridRules::default(),
             walls: WallLayer::new(),

@@ -20,6 +20,15 @@ const GAIN_PER_S: f32 = 1.2;
 pub const KEEP_M: f32 = 0.15;
 /// Fastest motion away, metres a second.
 const AWAY_M_S: f32 = 0.2;
+/// Beside what no plan shows, and while it stands, the drone keeps to the middle of what is nearer than this, metres.
+const ROOM_M: f32 = 0.4;
+/// Speed to the middle for each metre that it is off, 1/s, and at most, metres a second: no faster backwards than is heard.
+const CENTRE_PER_S: f32 = 1.0;
+const CENTRE_MOST_M_S: f32 = 0.15;
+/// What lies within 45 degrees of a direction lies that way, as a cosine.
+const THAT_WAY_COS: f32 = 0.7;
+/// Slower wishes are standing, metres a second.
+const STANDS_M_S: f32 = 0.02;
 /// Passes over the directions; two opposite ones that are too near settle in the middle.
 const PASSES: usize = 6;
 /// Echoes older than this say nothing about now, seconds: a sweep of eight one by one is 0.48 s.
@@ -82,10 +91,30 @@ impl Fence {
         self.unmapped_m
     }
 
+    /// Motion to the middle between what is on the left and on the right of a wish; without one, of all sides.
+    fn centred(&self, wish: (f32, f32)) -> (f32, f32) {
+        if self.unmapped_m > ROOM_M {
+            return (0.0, 0.0);
+        }
+        let gap = |ux: f32, uy: f32| {
+            let that_way = self.sides.iter().filter(|side| side.0 * ux + side.1 * uy > THAT_WAY_COS);
+            that_way.fold(ROOM_M, |least, side| least.min(side.2))
+        };
+        let speed = wish.0.hypot(wish.1);
+        let stands = speed < STANDS_M_S;
+        let (ux, uy) = if stands { (1.0, 0.0) } else { (wish.0 / speed, wish.1 / speed) };
+        let across = CENTRE_PER_S * 0.5 * (gap(-uy, ux) - gap(uy, -ux));
+        let along = if stands { CENTRE_PER_S * 0.5 * (gap(ux, uy) - gap(-ux, -uy)) } else { 0.0 };
+        let (cx, cy) = (along * ux - across * uy, along * uy + across * ux);
+        let share = (CENTRE_MOST_M_S / cx.hypot(cy).max(1e-3)).min(1.0);
+        (share * cx, share * cy)
+    }
+
     /// What is left of a wish, plan frame, and whether something is nearer than is kept.
     #[must_use]
     pub fn keep(&self, wish: (f32, f32)) -> ((f32, f32), bool) {
-        let (mut vx, mut vy) = wish;
+        let (cx, cy) = self.centred(wish);
+        let (mut vx, mut vy) = (wish.0 + cx, wish.1 + cy);
         for _ in 0..PASSES {
             for (ux, uy, gap) in self.sides.iter().filter(|side| side.2.is_finite()) {
                 let most = (GAIN_PER_S * (gap - KEEP_M)).max(-AWAY_M_S);
@@ -142,6 +171,20 @@ mod tests {
         assert!((-AWAY_M_S..-0.05).contains(&vx) && vy.abs() < 1e-5 && near, "{vx} {vy}");
         let ((vx, _), _) = fence(&[(0, -1.0)]).keep((0.5, 0.0));
         assert!((vx + AWAY_M_S).abs() < 1e-5, "never faster away than allowed: {vx}");
+    }
+
+    #[test]
+    fn beside_something_unmapped_the_drone_keeps_to_the_middle_and_makes_room_while_it_stands() {
+        // A box 0.2 m to the left, a wall 0.3 m to the right.
+        let beside = Fence { unmapped_m: 0.2, ..fence(&[(6, 0.2), (18, 0.3)]) };
+        let ((vx, vy), _) = beside.keep((0.4, 0.0));
+        assert!((vx - 0.4).abs() < 1e-4 && (vy + 0.5 * CENTRE_PER_S * 0.1).abs() < 1e-4, "{vx} {vy}");
+        // Somebody 0.25 m ahead, nothing behind: back, no faster than allowed, and not for ever.
+        let before = |gap: f32| Fence { unmapped_m: gap, ..fence(&[(0, gap)]) }.keep((0.0, 0.0)).0;
+        assert!((before(0.25).0 + 0.5 * CENTRE_PER_S * 0.15).abs() < 1e-4, "{:?}", before(0.25));
+        assert_eq!(before(ROOM_M + 0.01), (0.0, 0.0));
+        // Walls alone do not move it: the planned line keeps to their middle.
+        assert_eq!(fence(&[(0, 0.25)]).keep((0.0, 0.0)).0, (0.0, 0.0));
     }
 
     #[test]

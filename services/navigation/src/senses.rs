@@ -19,6 +19,32 @@ const PLAN_TOLERANCE_M: f32 = 0.12;
 /// And in proportion to the range: headings are a degree or two off, ranges 1 %.
 const RANGE_TOLERANCE: f32 = 0.03;
 
+/// An echo from so far within the airframe's edge is propeller wash, metres: more than ranges and mounts err.
+const INSIDE_M: f32 = 0.03;
+/// Two pings of a sensor are compared when they lie so far apart, seconds: a sweep, and one that was missed.
+const COMPARED_S: core::ops::Range<f32> = 0.05..0.6;
+
+/// Surfaces met at a flatter angle send nothing back, radians (FACTS 2: 25 to 30 degrees; mounts and headings err by
+/// some more). Along a corridor the cones that look ahead would otherwise find every person explained by its walls.
+const HEARD_RAD: f32 = 42.0 * core::f32::consts::PI / 180.0;
+/// People hurry no faster, metres a second: a larger change of range is another surface.
+const FASTEST_M_S: f32 = 2.0;
+/// Ranges and places err by less than makes this of a thing that stands, metres a second.
+const WALKS_M_S: f32 = 0.25;
+/// An approach is of now for so long, seconds: two sweeps.
+const FRESH_S: f64 = 0.5;
+
+/// Something comes nearer by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Approach {
+    /// Body frame, radians.
+    pub bearing: f32,
+    /// From the drone's middle, metres.
+    pub distance: f32,
+    /// Its own, metres a second.
+    pub speed: f32,
+}
+
 /// The newest word of one sonar.
 #[derive(Clone, Copy, Debug, Default)]
 struct Side {
@@ -26,16 +52,28 @@ struct Side {
     bearing: f32,
     /// From the drone's middle; infinite without an echo.
     distance: f32,
+    /// Where the sensor was, plan frame, metres.
+    from: (f32, f32),
+    /// How fast it comes nearer by itself, metres a second.
+    own_m_s: f32,
 }
 
 /// What the side sonars said last.
 #[derive(Clone, Debug, Default)]
 pub struct Senses {
+    /// Of the airframe.
+    radius_m: f32,
     sides: [Side; MAX_SONARS],
     newest_ns: u64,
 }
 
 impl Senses {
+    /// For an airframe of this radius: nothing answers from within it.
+    #[must_use]
+    pub fn new(radius_m: f32) -> Self {
+        Self { radius_m, ..Self::default() }
+    }
+
     /// Takes one reading in: the beam for the grid, `None` for the down sonar, faults and nonsense.
     /// `place` is the newest pose; the beam starts where the drone was at the ping.
     pub fn take(&mut self, reading: &SonarReading, place: &Place, plan: &Plan) -> Option<Beam> {
@@ -53,10 +91,18 @@ impl Senses {
         };
         let (sin, cos) = reading.bearing_rad.sin_cos();
         let ahead = reading.mount_x_m * cos + reading.mount_y_m * sin;
+        let distance = range.map_or(f32::INFINITY, |range| range + ahead);
+        if distance < self.radius_m - INSIDE_M {
+            return None;
+        }
+        let last = self.sides[reading.sensor as usize];
+        let since = seconds_between(last.ping_ns, reading.ping_ns) as f32;
         self.sides[reading.sensor as usize] = Side {
             ping_ns: reading.ping_ns,
             bearing: reading.bearing_rad,
-            distance: range.map_or(f32::INFINITY, |range| range + ahead),
+            distance,
+            from: (0.0, 0.0),
+            own_m_s: 0.0,
         };
         self.newest_ns = self.newest_ns.max(reading.ping_ns);
 
@@ -70,6 +116,16 @@ impl Senses {
             Some(range) if mapped(plan, x_m, y_m, angle_rad, range, place.sigma) => Echo::Mapped(range),
             Some(range) => Echo::Obstacle(range),
         };
+        let side = &mut self.sides[reading.sensor as usize];
+        side.from = (x_m, y_m);
+        let thing = matches!(echo, Echo::Obstacle(_));
+        if last.ping_ns > 0 && thing && COMPARED_S.contains(&since) {
+            let (sin, cos) = angle_rad.sin_cos();
+            let flown = (x_m - last.from.0) * cos + (y_m - last.from.1) * sin;
+            let own_m_s = (last.distance - side.distance - flown) / since;
+            // Faster, or from nowhere, is another surface.
+            side.own_m_s = if own_m_s < FASTEST_M_S { own_m_s } else { 0.0 };
+        }
         Some(Beam { x_m, y_m, angle_rad, echo })
     }
 
@@ -77,6 +133,16 @@ impl Senses {
     #[must_use]
     pub fn fresh(&self, now: u64, age_s: f32) -> bool {
         self.newest_ns > 0 && seconds_between(self.newest_ns, now) <= f64::from(age_s)
+    }
+
+    /// What comes nearer by itself: faster than the drone's own motion explains.
+    pub fn approaching(&self, now: u64) -> impl Iterator<Item = Approach> {
+        let fresh = move |side: &&Side| side.ping_ns > 0 && seconds_between(side.ping_ns, now) <= FRESH_S;
+        self.sides.iter().filter(fresh).filter(|side| side.own_m_s > WALKS_M_S).map(|side| Approach {
+            bearing: side.bearing,
+            distance: side.distance,
+            speed: side.own_m_s,
+        })
     }
 
     /// Bearing in the body frame and distance from the drone's middle of everything that a side sonar has
@@ -97,7 +163,12 @@ fn mapped(plan: &Plan, x: f32, y: f32, angle: f32, range: f32, sigma: f32) -> bo
     for ray in 0..RAYS {
         let offset = CONE_HALF_RAD * (2.0 * ray as f32 / (RAYS - 1) as f32 - 1.0);
         match plan.cast_ray(x, y, angle + offset, range + tolerance) {
-            Some(hit) if hit.range_m >= range - tolerance => return true,
+            Some(hit)
+                if hit.range_m >= range - tolerance && (hit.scatters || hit.incidence_rad < HEARD_RAD) =>
+            {
+                return true;
+            }
+            Some(hit) if hit.range_m >= range - tolerance => behind = false,
             Some(_) => {}
             None => behind = false,
         }
@@ -183,6 +254,53 @@ mod tests {
         let moving = Place { stamp_ns: 1_100_000_000, vx: 0.5, ..place(1.2, 0.85) };
         let beam = senses.take(&reading(90.0, 0.5), &moving, &plan()).unwrap();
         assert!((beam.x_m - 1.15).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_cone_along_a_wall_hears_people_and_not_the_wall() {
+        // A wall 0.9 m to the right is met at 55 degrees by what looks 35 degrees off the way: it answers nothing.
+        let aslant = reading(35.0, 1.3);
+        let corridor = Place { heading: 55.0_f32.to_radians(), ..place(1.4, 0.85) };
+        let plan = Plan::from_ascii(&["                         #"; 40], 0.1);
+        let corridor = Place { y: 2.0, ..corridor };
+        let beam = Senses::default().take(&reading(-55.0, 0.9), &corridor, &plan).unwrap();
+        assert_eq!(beam.echo, Echo::Mapped(0.9), "square on, the wall is heard");
+        let beam =
+            Senses::default().take(&aslant, &Place { heading: 0.0, x: 1.4, ..corridor }, &plan).unwrap();
+        assert_eq!(beam.echo, Echo::Mapped(1.3), "at 35 degrees it may be");
+        let along = Place { heading: 20.0_f32.to_radians(), x: 1.6, ..corridor };
+        let beam = Senses::default().take(&reading(40.0, 1.2), &along, &plan).unwrap();
+        assert_eq!(beam.echo, Echo::Obstacle(1.2), "at 60 degrees it is not");
+    }
+
+    #[test]
+    fn nothing_answers_from_within_the_airframe() {
+        let plan = Plan::from_ascii(&["                         "; 25], 0.1);
+        let mut senses = Senses::new(0.225);
+        let at = |range_m: f32| SonarReading { mount_x_m: 0.06, mount_y_m: 0.0, ..reading(0.0, range_m) };
+        // 0.19 m from the middle is under the guards, 0.20 m may be an error of the range.
+        assert_eq!(senses.take(&at(0.13), &place(1.2, 1.2), &plan), None);
+        assert_eq!(senses.near(1_000_000_000, 0.5).count(), 0);
+        let beam = senses.take(&at(0.14), &place(1.2, 1.2), &plan).unwrap();
+        assert_eq!(beam.echo, Echo::Obstacle(0.14));
+    }
+
+    #[test]
+    fn who_walks_up_approaches_and_what_is_flown_up_to_does_not() {
+        let plan = Plan::from_ascii(&["                                        "; 25], 0.1);
+        let approach = |speed: f32, walk: f32| {
+            let mut senses = Senses::new(0.225);
+            for i in 0..3u64 {
+                let (ns, t) = (1_000_000_000 + i * 240_000_000, 0.24 * i as f32);
+                let reading = SonarReading { ping_ns: ns, ..reading(0.0, 1.8 - (speed + walk) * t) };
+                let place = Place { stamp_ns: ns, vx: speed, ..place(0.5 + speed * t, 1.2) };
+                senses.take(&reading, &place, &plan);
+            }
+            senses.approaching(1_480_000_000).map(|a| a.speed).next()
+        };
+        assert_eq!(approach(0.5, 0.0), None);
+        assert!((approach(0.3, 0.8).unwrap() - 0.8).abs() < 0.02);
+        assert_eq!(approach(0.3, 3.0), None, "another surface");
     }
 
     #[test]

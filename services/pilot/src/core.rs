@@ -1,6 +1,7 @@
 //! The pilot without ports.
 
 use crate::config::PilotConfig;
+use crate::ground::Below;
 use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, age_s};
 use control::{
     ClimbController, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp, Tilt, TouchDown,
@@ -21,6 +22,8 @@ pub struct Craft {
     pub has_down: bool,
     /// What the down sonar should read on the ground, metres.
     pub rest_m: f32,
+    /// What the flow sensor's beam should read on the ground, metres.
+    pub beam_rest_m: f32,
     /// Throttle that should hover, microseconds.
     pub hover_us: f32,
     /// Cells in series.
@@ -100,6 +103,7 @@ pub struct PilotCore {
     pub(crate) climb: ClimbController,
     pub(crate) motion: Motion,
     pub(crate) velocity: VelocityController,
+    pub(crate) below: Below,
     pub(crate) shield: Shield,
     pub(crate) spool: Option<SpoolUp>,
     pub(crate) touch: TouchDown,
@@ -153,6 +157,7 @@ impl PilotCore {
             climb: ClimbController::new(config.climb, hover_us),
             motion: Motion::new(config.motion),
             velocity: VelocityController::new(velocity, config.motion.drag_per_s),
+            below: Below::new(craft.beam_rest_m),
             shield: Shield::new(config.shield, craft.radius_m, craft.sides.iter().copied()),
             spool: None,
             touch: TouchDown::default(),

@@ -221,7 +221,11 @@ impl PilotCore {
                 (VerticalWish::Rate(rate), true)
             }
             _ => {
-                let floor = self.height.surface_m() + c.min_clearance_m;
+                let below = self
+                    .below
+                    .edge_m(now)
+                    .map_or(self.height.surface_m(), |edge| edge.max(self.height.surface_m()));
+                let floor = below + c.min_clearance_m;
                 let wish = self.height_wish_m.max(floor).clamp(c.min_clearance_m, c.max_height_m);
                 let now_m = self.height.height_m();
                 let reach = HEIGHT_SLEW_M_S / c.climb.height_gain_per_s;

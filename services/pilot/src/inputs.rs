@@ -4,8 +4,8 @@ use crate::core::PilotCore;
 use crate::senses::SetpointSeen;
 use control::{Echo, Look, Tilt, Vector};
 use ipc_types::{
-    Attitude, FlightState, Patrol, PatrolState, Phase, Pose, Power, Setpoint, SonarHealth, SonarRanges,
-    SonarStatus,
+    Attitude, FlightState, FlowMotion, Patrol, PatrolState, Phase, Pose, Power, Setpoint, SonarHealth,
+    SonarRanges, SonarStatus,
 };
 
 /// Speed of sound at 20 C, m/s, to place an echo in time.
@@ -121,10 +121,26 @@ impl PilotCore {
         }
     }
 
+    /// Takes the range of the flow sensor's beam.
+    pub fn flow(&mut self, message: &FlowMotion) {
+        if !self.below.range(message.ranged_ns, message.range_m) {
+            return;
+        }
+        if self.phase == Phase::Grounded && !self.flight.armed {
+            self.below.stand(message.range_m);
+        } else if self.spool.is_none() && self.airborne() {
+            let tilt = self.tilt().magnitude();
+            self.height.measure_beam(message.ranged_ns, message.range_m, self.below.rest_m(), tilt);
+        }
+    }
+
     fn hear_ground(&mut self, ping_ns: u64, range_m: f32) {
         let at = ping_ns + (range_m / SOUND_M_S * 1e9) as u64;
         if let Some(spool) = &mut self.spool {
             spool.hear(at, range_m - self.height.rest_m());
+        } else if self.airborne() && self.below.sees(ping_ns) {
+            let heard = self.height.height_m() - (range_m - self.height.rest_m());
+            self.below.hear(at, heard, self.height.surface_m());
         } else if self.airborne() {
             let tilt = self.tilt().magnitude();
             self.height.measure(at, range_m, tilt);

@@ -9,6 +9,7 @@ mod config;
 mod core;
 mod evidence;
 mod flying;
+mod ground;
 mod inputs;
 mod phases;
 mod report;

@@ -5,7 +5,8 @@ use crate::core::{Craft, PilotCore};
 use control::Vector;
 use floorplan::DistanceField;
 use ipc_types::{
-    Attitude, Channels, Command, FlightState, Patrol, PilotState, Pose, Power, Setpoint, SonarRanges, Text,
+    Attitude, Channels, Command, FlightState, FlowMotion, Patrol, PilotState, Pose, Power, Setpoint,
+    SonarRanges, Text,
 };
 use runtime::{Input, Output, Ports, Service, Start, StartError};
 
@@ -22,6 +23,7 @@ pub struct Pilot {
     patrol: Input<Patrol>,
     pose: Input<Pose>,
     ranges: Input<SonarRanges>,
+    flow: Input<FlowMotion>,
     attitude: Input<Attitude>,
     state: Input<FlightState>,
     power: Input<Power>,
@@ -51,6 +53,7 @@ fn craft(start: &Start) -> Craft {
         has_down: down.is_some(),
         // The middle of the cylinder is half its height above the skids.
         rest_m: down.map_or(0.0, |sonar| (0.5 * v.body.height_m + sonar.z_m).clamp(0.0, 0.3)),
+        beam_rest_m: 0.5 * v.body.height_m,
         hover_us: 1000.0 + 1000.0 * share,
         cells: v.battery.cells,
         capacity_mah: v.battery.capacity_mah,
@@ -72,6 +75,7 @@ impl Service for Pilot {
             patrol: ports.input(2)?,
             pose: ports.input(4)?,
             ranges: ports.input(8)?,
+            flow: ports.input(8)?,
             attitude: ports.input(8)?,
             state: ports.input(4)?,
             power: ports.input(4)?,
@@ -99,6 +103,9 @@ impl Service for Pilot {
         }
         while let Some(message) = self.pose.receive() {
             core.pose(&message);
+        }
+        while let Some(message) = self.flow.receive() {
+            core.flow(&message);
         }
         while let Some(message) = self.ranges.receive() {
             core.ranges(&message);

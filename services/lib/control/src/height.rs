@@ -157,6 +157,15 @@ const ROOMY_M: f32 = 0.8;
 /// How fast a level that cannot be (below the floor) or does not matter (thin) is forgotten, m/s.
 const FORGET_M_S: f32 = 0.04;
 
+/// What a beam's range may miss, metres: three times its noise over carpets, where it is four times that of floors.
+const BEAM_GATE_M: f32 = 0.2;
+/// Mean miss of the beam over a good floor, metres; where it misses by more, it is followed more slowly.
+const BEAM_SURE_M: f32 = 0.02;
+/// Share of the newest miss in the mean: about a second of them.
+const BEAM_SHARE: f32 = 0.05;
+/// Ranges of a beam that agree on another level: 0.16 s at 25 Hz.
+const BEAM_READINGS: usize = 4;
+
 /// The estimator.
 #[derive(Clone, Debug)]
 pub struct HeightEstimator {
@@ -171,6 +180,8 @@ pub struct HeightEstimator {
     now_ns: u64,
     last_echo_ns: u64,
     doubts: Doubts,
+    /// What the beam's ranges have missed of late, metres: a floor or a carpet.
+    beam_m: f32,
 }
 
 impl HeightEstimator {
@@ -189,6 +200,7 @@ impl HeightEstimator {
             now_ns: 0,
             last_echo_ns: 0,
             doubts: Doubts::default(),
+            beam_m: BEAM_SURE_M,
         }
     }
 
@@ -265,6 +277,39 @@ impl HeightEstimator {
         later.1
     }
 
+    /// Takes a range of a narrow beam along the body's axis, measured at `at_ns` from `rest_m` above the skids with the
+    /// body tilted by `tilt_rad`. It sees what lies under the middle and nothing else: what it does not fit is another
+    /// level, never a motion, which it would have followed.
+    pub fn measure_beam(&mut self, at_ns: u64, range_m: f32, rest_m: f32, tilt_rad: f32) -> Echo {
+        let tilt = if tilt_rad.is_finite() { tilt_rad.abs() } else { 0.0 };
+        if !(range_m > 0.0 && range_m < 20.0) || tilt > self.config.max_tilt_deg.to_radians() {
+            return Echo::Refused;
+        }
+        let at_ns = at_ns.min(self.now_ns);
+        let error = range_m * tilt.cos() - rest_m - (self.height_at(at_ns) - self.surface_m);
+        let gap = seconds(self.last_echo_ns, at_ns);
+        if error.abs() <= BEAM_GATE_M {
+            self.doubts = Doubts::default();
+            self.beam_m += BEAM_SHARE * (error.abs() - self.beam_m);
+            // The noise of the climb rate goes with noise times bandwidth to the power of 3/2.
+            let calm = (BEAM_SURE_M / self.beam_m.max(BEAM_SURE_M)).powf(2.0 / 3.0);
+            self.correct(at_ns, gap, error, self.config.bandwidth_rad_s * calm);
+            return Echo::Used;
+        }
+        self.doubts.push(at_ns, error);
+        let newest = self.doubts.count.saturating_sub(BEAM_READINGS);
+        let last = &self.doubts.error_m[newest..self.doubts.count];
+        let mean = last.iter().sum::<f32>() / BEAM_READINGS as f32;
+        if last.len() < BEAM_READINGS || last.iter().any(|error| (error - mean).abs() > BEAM_GATE_M) {
+            return Echo::Doubted;
+        }
+        self.doubts = Doubts::default();
+        self.last_echo_ns = at_ns;
+        let level = self.surface_m - mean;
+        self.surface_m = if level.abs() <= BEAM_GATE_M { 0.0 } else { level };
+        Echo::Step
+    }
+
     /// Takes an echo that left the ground at `at_ns`, with the body tilted by `tilt_rad` from the vertical.
     pub fn measure(&mut self, at_ns: u64, range_m: f32, tilt_rad: f32) -> Echo {
         let tilt = if tilt_rad.is_finite() { tilt_rad.abs() } else { 0.0 };
@@ -284,7 +329,7 @@ impl HeightEstimator {
             // What was doubted shortly before did not drift there since the last echo that fitted.
             let since = self.doubts.last().map_or(gap, |(at, _)| gap.min(seconds(at, at_ns)));
             self.doubts = Doubts::default();
-            self.correct(at_ns, since, error);
+            self.correct(at_ns, since, error, self.config.bandwidth_rad_s);
             return Echo::Used;
         }
         self.doubted(at_ns, error)
@@ -324,10 +369,10 @@ impl HeightEstimator {
     }
 
     /// The fading-memory filter of third order: three equal poles at exp(-bandwidth x period).
-    fn correct(&mut self, at_ns: u64, gap_s: f32, error: f32) {
+    fn correct(&mut self, at_ns: u64, gap_s: f32, error: f32, bandwidth_rad_s: f32) {
         self.last_echo_ns = at_ns;
         let period = gap_s.clamp(0.03, 0.2);
-        let pole = (-self.config.bandwidth_rad_s * period).exp();
+        let pole = (-bandwidth_rad_s * period).exp();
         let left = 1.0 - pole;
         let height = (1.0 - pole * pole * pole) * error;
         let climb = 1.5 * left * left * (1.0 + pole) / period * error;

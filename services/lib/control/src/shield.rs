@@ -149,6 +149,8 @@ pub struct Shield {
     sweep_s: f32,
 }
 
+/// An echo from so far within the airframe's edge is none, metres: more than ranges and mounts err.
+const INSIDE_M: f32 = 0.03;
 /// Free way beyond which nothing matters at indoor speeds, metres.
 const FAR_M: f32 = 4.0;
 /// Directions within a cone that an echo is tried at.
@@ -189,7 +191,12 @@ impl Shield {
             Echo::Range(range) => range > 0.0 && range < 20.0,
             Echo::Nothing => true,
         };
+        // Nothing answers from within the airframe: propeller wash.
+        let within = |sensor: &Sensor, range: f32| {
+            range + sensor.mount.dot(Vector::along(sensor.bearing)) < self.radius_m - INSIDE_M
+        };
         match self.sensors.get_mut(sensor) {
+            Some(Some(sensor)) if matches!(look.echo, Echo::Range(range) if within(sensor, range)) => sane,
             Some(Some(sensor)) if sane && look.heading.is_finite() => {
                 sensor.look = Some(look);
                 if let (Some(place), Echo::Range(range)) = (look.place.and_then(Vector::known), look.echo) {

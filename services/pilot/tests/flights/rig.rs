@@ -51,6 +51,7 @@ pub(crate) fn craft() -> Craft {
             .collect(),
         has_down: true,
         rest_m: REST,
+        beam_rest_m: 0.08,
         hover_us: 1480.0,
         cells: 4,
         capacity_mah: 3300.0,
