@@ -27,7 +27,7 @@ pub(crate) const MAX_GIVEN_UP: usize = 64;
 /// Planning that failed is tried again with a clean slate this often.
 const FRESH_STARTS: u32 = 4;
 /// So often in a round what stood in the way is believed to have moved on, when nothing is left to see but behind it.
-const AMNESTIES: u32 = 3;
+const AMNESTIES: u32 = 6;
 /// Marks nearer to the drone than this are forgotten when it is walled in by them, metres.
 const FORGET_M: f32 = 1.0;
 /// Work slices between two looks whether the next stops are still worth the way: once a second.

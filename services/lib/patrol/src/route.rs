@@ -239,10 +239,9 @@ fn obstacle(map: &Costmap, start: usize, path: &[usize]) -> Option<Obstacle> {
         return Some(Obstacle::DoorClosed(door));
     }
     let narrow = bad.iter().copied().filter(|cell| map.is_narrow(*cell) && !map.is_obstructed(*cell));
-    Some(match narrow.min_by(|a, b| map.mapped(*a).total_cmp(&map.mapped(*b))) {
-        Some(cell) => {
-            Obstacle::Narrow { width_m: map.passage_width(cell), needed_m: 2.0 * map.limits().clearance_m() }
-        }
-        None => Obstacle::Unmapped,
-    })
+    let needed_m = 2.0 * map.limits().clearance_m();
+    let narrowest = narrow.min_by(|a, b| map.mapped(*a).total_cmp(&map.mapped(*b)));
+    // Along the wall of a passage that is wide enough leads only what something in its middle has pushed aside.
+    let width = narrowest.map(|cell| map.passage_width(cell)).filter(|width| *width < needed_m);
+    Some(width.map_or(Obstacle::Unmapped, |width_m| Obstacle::Narrow { width_m, needed_m }))
 }

@@ -43,6 +43,9 @@ pub(crate) fn room() -> Plan {
     Plan::from_ascii(&rows.iter().map(String::as_str).collect::<Vec<_>>(), 0.1)
 }
 
+/// The flow sensor sits in the middle of the airframe.
+pub(crate) const BEAM_REST: f32 = 0.08;
+
 pub(crate) fn craft() -> Craft {
     Craft {
         radius_m: RADIUS,
@@ -51,7 +54,7 @@ pub(crate) fn craft() -> Craft {
             .collect(),
         has_down: true,
         rest_m: REST,
-        beam_rest_m: 0.08,
+        beam_rest_m: BEAM_REST,
         hover_us: 1480.0,
         cells: 4,
         capacity_mah: 3300.0,
@@ -84,6 +87,10 @@ pub(crate) struct Rig {
     pub(crate) gust_rms: f32,
     gust: Vector,
     pub(crate) surface: f32,
+    /// Level of an edge that the sonar's cone hears in half of its pings, beside the middle.
+    pub(crate) edge: f32,
+    /// Whether the flow sensor's beam measures.
+    pub(crate) beam: bool,
     pub(crate) down_lost: f32,
     pub(crate) down_health: SonarHealth,
     pub(crate) sides_dead: bool,
@@ -134,6 +141,8 @@ impl Rig {
             gust_rms: 0.0,
             gust: Vector::ZERO,
             surface: 0.0,
+            edge: 0.0,
+            beam: false,
             down_lost: 0.03,
             down_health: SonarHealth::Good,
             sides_dead: false,

@@ -1,9 +1,11 @@
 //! What the small aircraft tells the pilot.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use crate::rig::{COMPASS, MOUNT, MS, REST, Rig};
+use crate::rig::{BEAM_REST, COMPASS, MOUNT, MS, REST, Rig};
 use control::{Tilt, Vector};
-use ipc_types::{Attitude, FlightState, Pose, Power, SonarHealth, SonarRanges, SonarReading, SonarStatus};
+use ipc_types::{
+    Attitude, FlightState, FlowMotion, Pose, Power, SonarHealth, SonarRanges, SonarReading, SonarStatus,
+};
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 impl Rig {
@@ -41,6 +43,16 @@ impl Rig {
             self.core.power(&power);
         }
         self.sense_pose();
+        if self.beam && self.steps.is_multiple_of(2) {
+            // VL53L0X class: 1 % and 6 mm.
+            let above = self.height - self.surface + BEAM_REST;
+            let noise = (0.006 + 0.01 * above) * self.noise.normal();
+            self.core.flow(&FlowMotion {
+                ranged_ns: now,
+                range_m: above / self.tilt.magnitude().cos() + noise,
+                ..Default::default()
+            });
+        }
         self.sense_ranges();
         if self.steps % 3 == 1
             && let Some(setpoint) = &mut self.setpoint
@@ -130,7 +142,8 @@ impl Rig {
             let mut down = self.reading(8, 0.0, -FRAC_PI_2);
             down.health = self.down_health.code();
             if self.noise.unit() >= self.down_lost {
-                down.range_m = self.height - self.surface + REST + 0.005 * self.noise.normal();
+                let below = if self.noise.unit() < 0.5 { self.surface.max(self.edge) } else { self.surface };
+                down.range_m = self.height - below + REST + 0.005 * self.noise.normal();
                 down.range_m = down.range_m.max(0.021);
                 down.status = SonarStatus::Ok.code();
             }
