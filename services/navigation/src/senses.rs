@@ -259,19 +259,19 @@ mod tests {
 
     #[test]
     fn a_cone_along_a_wall_hears_people_and_not_the_wall() {
-        // A wall 0.9 m to the right is met at 55 degrees by what looks 35 degrees off the way: it answers nothing.
-        let aslant = reading(35.0, 1.3);
-        let corridor = Place { heading: 55.0_f32.to_radians(), ..place(1.4, 0.85) };
+        // A wall a metre to the right.
         let plan = Plan::from_ascii(&["                         #"; 40], 0.1);
-        let corridor = Place { y: 2.0, ..corridor };
-        let beam = Senses::default().take(&reading(-55.0, 0.9), &corridor, &plan).unwrap();
-        assert_eq!(beam.echo, Echo::Mapped(0.9), "square on, the wall is heard");
-        let beam =
-            Senses::default().take(&aslant, &Place { heading: 0.0, x: 1.4, ..corridor }, &plan).unwrap();
-        assert_eq!(beam.echo, Echo::Mapped(1.3), "at 35 degrees it may be");
-        let along = Place { heading: 20.0_f32.to_radians(), x: 1.6, ..corridor };
-        let beam = Senses::default().take(&reading(40.0, 1.2), &along, &plan).unwrap();
-        assert_eq!(beam.echo, Echo::Obstacle(1.2), "at 60 degrees it is not");
+        let heard = |heading_deg: f32, bearing_deg: f32, range_m: f32| {
+            let there = Place { heading: heading_deg.to_radians(), ..place(1.6, 2.0) };
+            Senses::default().take(&reading(bearing_deg, range_m), &there, &plan).unwrap().echo
+        };
+        assert_eq!(heard(35.0, -35.0, 0.7), Echo::Mapped(0.7), "square on it is heard");
+        assert_eq!(heard(0.0, 35.0, 0.9), Echo::Mapped(0.9), "at 35 degrees it may be");
+        assert_eq!(
+            heard(30.0, 40.0, 1.5),
+            Echo::Obstacle(1.5),
+            "from 55 degrees on it is not: somebody is there"
+        );
     }
 
     #[test]
