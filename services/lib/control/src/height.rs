@@ -6,6 +6,7 @@
 //! a line: a level one is a change of `surface`, the level of what is below; a steep one is the drone's own motion.
 
 use crate::check::{RangeError, within};
+use crate::doubts::{DOUBT_APART_S, DOUBTS, Doubts};
 use crate::held::seconds;
 
 /// Settings of the height estimator.
@@ -70,79 +71,12 @@ pub enum Echo {
     Refused,
 }
 
-/// Readings in a row that did not fit: when, and by how much.
-#[derive(Clone, Copy, Debug, Default)]
-struct Doubts {
-    count: usize,
-    at_ns: [u64; DOUBTS],
-    error_m: [f32; DOUBTS],
-}
-
-/// The straight line through doubted errors.
-#[derive(Clone, Copy, Debug)]
-struct Line {
-    /// At the newest reading, metres.
-    error_m: f32,
-    /// Growth, metres a second.
-    slope_m_s: f32,
-    /// Rms distance of the readings from it, metres.
-    scatter_m: f32,
-}
-
-impl Doubts {
-    fn last(&self) -> Option<(u64, f32)> {
-        let last = self.count.checked_sub(1)?;
-        Some((self.at_ns[last], self.error_m[last]))
-    }
-
-    /// Appends a reading; begins anew when it is late or tells of something else.
-    fn push(&mut self, at_ns: u64, error_m: f32) {
-        if self.last().is_some_and(|(at, error)| {
-            seconds(at, at_ns) > DOUBT_APART_S || (error - error_m).abs() > ANOTHER_M
-        }) {
-            self.count = 0;
-        }
-        if self.count == DOUBTS {
-            self.at_ns.rotate_left(1);
-            self.error_m.rotate_left(1);
-            self.count -= 1;
-        }
-        (self.at_ns[self.count], self.error_m[self.count]) = (at_ns, error_m);
-        self.count += 1;
-    }
-
-    /// Least squares; `None` with fewer than three readings.
-    fn line(&self) -> Option<Line> {
-        let n = self.count as f32;
-        let (newest, _) = self.last().filter(|_| self.count >= 3)?;
-        let points = || {
-            let times = self.at_ns[..self.count].iter().map(|at| -seconds(*at, newest));
-            times.zip(&self.error_m[..self.count])
-        };
-        let (t, e) = points().fold((0.0, 0.0), |(t, e), (time, error)| (t + time / n, e + error / n));
-        let (tt, te) = points().fold((0.0, 0.0), |(tt, te), (time, error)| {
-            (tt + (time - t) * (time - t), te + (time - t) * (error - e))
-        });
-        let slope_m_s = if tt > 1e-6 { te / tt } else { 0.0 };
-        let error_m = e - slope_m_s * t;
-        let scatter =
-            points().map(|(time, error)| (error - error_m - slope_m_s * time).powi(2)).sum::<f32>() / n;
-        Some(Line { error_m, slope_m_s, scatter_m: scatter.sqrt() })
-    }
-}
-
 /// Heights remembered: at 50 Hz 0.64 s, several times the age of the oldest echo.
 const MEMORY: usize = 32;
 /// Unexplained acceleration that is believed, m/s2: a third of the weight.
 const MAX_BIAS_M_S2: f32 = 3.5;
 /// Silence from which the gate widens, seconds: after a shorter one, what does not fit is rather a step than a drift.
 const SILENCE_S: f32 = 0.4;
-/// Doubted readings looked at together: a third of a second.
-const DOUBTS: usize = 6;
-/// Doubted readings farther apart than this do not belong together, seconds.
-const DOUBT_APART_S: f32 = 0.4;
-/// Two readings that differ by more are of different things, metres: 0.2 s of free fall end in 0.12 m a reading.
-const ANOTHER_M: f32 = 0.35;
 /// Readings on one line scatter about it by less than this, metres: over carpets echoes come 2 to 10 cm late.
 const LINE_M: f32 = 0.04;
 /// Errors that grow slower than this are those of another level, metres a second.

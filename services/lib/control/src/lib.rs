@@ -11,6 +11,7 @@ mod arbitration;
 mod braking;
 mod check;
 mod climb;
+mod doubts;
 mod failsafe;
 mod heading;
 mod height;

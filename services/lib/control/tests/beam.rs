@@ -1,5 +1,4 @@
 //! The height by a narrow beam: floors, carpets, tables, and the drone's own motion.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
 use control::{HeightConfig, HeightEcho, HeightEstimator};
 
