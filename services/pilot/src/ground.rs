@@ -53,9 +53,10 @@ impl Below {
         self.rest_m
     }
 
-    /// A range of the beam; false when it is none, or not a new one.
-    pub(crate) fn range(&mut self, ranged_ns: u64, range_m: f32) -> bool {
-        let new = ranged_ns > self.ranged_ns && range_m > 0.0 && range_m < 20.0;
+    /// A range of the beam; false when it is none, not a new one, or from after the message `sent_ns` that brought it:
+    /// a stamp from the future would make all later ranges old.
+    pub(crate) fn range(&mut self, sent_ns: u64, ranged_ns: u64, range_m: f32) -> bool {
+        let new = ranged_ns > self.ranged_ns && ranged_ns <= sent_ns && range_m > 0.0 && range_m < 20.0;
         if new {
             self.ranged_ns = ranged_ns;
         }
@@ -108,9 +109,9 @@ mod tests {
     fn the_beam_is_the_height_while_it_brings_new_ranges() {
         let mut below = Below::default();
         assert!(!below.sees(1000 * MS));
-        assert!(
-            below.range(1000 * MS, 1.2) && !below.range(1000 * MS, 1.2) && !below.range(1010 * MS, f32::NAN)
-        );
+        let mut range = |sent: u64, ranged: u64, metres: f32| below.range(sent * MS, ranged * MS, metres);
+        assert!(!range(990, 9000, 1.2), "from the future");
+        assert!(range(1000, 1000, 1.2) && !range(1000, 1000, 1.2) && !range(1010, 1010, f32::NAN));
         assert!(below.sees(1100 * MS) && !below.sees(1200 * MS));
     }
 }

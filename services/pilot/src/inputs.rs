@@ -123,7 +123,7 @@ impl PilotCore {
 
     /// Takes the range of the flow sensor's beam.
     pub fn flow(&mut self, message: &FlowMotion) {
-        if !self.below.range(message.ranged_ns, message.range_m) {
+        if !self.below.range(message.header.stamp_ns, message.ranged_ns, message.range_m) {
             return;
         }
         if self.phase == Phase::Grounded && !self.flight.armed {

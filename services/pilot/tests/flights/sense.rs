@@ -47,11 +47,10 @@ impl Rig {
             // VL53L0X class: 1 % and 6 mm.
             let above = self.height - self.surface + BEAM_REST;
             let noise = (0.006 + 0.01 * above) * self.noise.normal();
-            self.core.flow(&FlowMotion {
-                ranged_ns: now,
-                range_m: above / self.tilt.magnitude().cos() + noise,
-                ..Default::default()
-            });
+            let range_m = above / self.tilt.magnitude().cos() + noise;
+            let mut flow = FlowMotion { ranged_ns: now, range_m, ..Default::default() };
+            flow.header.stamp_ns = now;
+            self.core.flow(&flow);
         }
         self.sense_ranges();
         if self.steps % 3 == 1
