@@ -108,6 +108,8 @@ fn fly(setup: &Setup, seed: u64, keep: usize) -> Result<String> {
     let mut cause = 0;
     let mut context = String::new();
     let (mut aloft, mut wrong, mut worst) = (0u32, 0u32, 0.0f32);
+    // Squares of the velocity's error and their number, with a floor that the flow sensor sees and without.
+    let mut swerves = [(0.0f32, 0u32); 2];
     let mut misses = NEAR_M.map(|near| (near, false, 0u32));
     while (flight.bus.now() as f64 * 1e-9) < setup.patience_s {
         flight.run_for(0.1);
@@ -133,6 +135,11 @@ fn fly(setup: &Setup, seed: u64, keep: usize) -> Result<String> {
             aloft += 1;
             wrong += u32::from(off > HEIGHT_OFF_M);
             worst = worst.max(off);
+            let (x, y) =
+                (line.pose.velocity_x_m_s - truth.velocity_x_m_s, line.pose.velocity_y_m_s - truth.velocity_y_m_s);
+            let (sum, count) = &mut swerves[usize::from(line.flow.quality < 60)];
+            *sum += x * x + y * y;
+            *count += 1;
         }
         for (near, within, count) in &mut misses {
             let now = truth.z_m > ALOFT_M && truth.clearance_m < *near + if *within { AWAY_M } else { 0.0 };
@@ -183,6 +190,12 @@ fn fly(setup: &Setup, seed: u64, keep: usize) -> Result<String> {
     }
     let share = 100.0 * f64::from(wrong) / f64::from(aloft.max(1));
     write!(out, ", height off {worst:.2} at worst and {share:.1} % of the time")?;
+    let [seen, blind] = swerves.map(|(sum, count)| (sum / count.max(1) as f32).sqrt());
+    write!(
+        out,
+        ", velocity off {seen:.3} m/s rms, {blind:.3} in the {:.1} % without flow",
+        100.0 * f64::from(swerves[1].1) / f64::from(aloft.max(1))
+    )?;
     write!(out, ", {}{hovers}{context}", flight.witness.round.text)?;
     if truth.contacts == 0 {
         return Ok(out);
