@@ -20,12 +20,16 @@ const BESIDE_PER_S: f32 = 0.7;
 /// Uncertainty of the velocity that costs no speed, metres a second, and over how much more it falls to the least share.
 const KNOWN_M_S: f32 = 0.08;
 const UNKNOWN_OVER_M_S: f32 = 0.25;
-/// Cells are widened by the airframe and this, metres: gusts and an error of the velocity carry the drone 0.1 m off its way
-/// before it is flown back, and the raster eats five centimetres. What is narrower on the plan (doors) is flown along the
-/// planned line.
-const VALLEY_MARGIN_M: f32 = 0.10;
-/// Strip looked at ahead is wider than the airframe by this on each side, metres.
-const SWATH_MARGIN_M: f32 = 0.08;
+/// Cells are widened by the airframe and this, metres, where there is room: gusts and an error of the velocity carry
+/// the drone 0.1 m off its way before it is flown back, and the raster eats five centimetres. Where that leaves no way,
+/// by the second: a passage of the disc + 0.30 m is still flown. What is narrower on the plan (doors) is flown along
+/// the planned line.
+const ROOMY_M: f32 = 0.18;
+const TIGHT_M: f32 = 0.10;
+/// The strip looked at ahead is wider than the airframe by this on each side, metres; where there is room, and where
+/// there is little.
+const ROOMY_SWATH_M: f32 = 0.12;
+const TIGHT_SWATH_M: f32 = 0.08;
 /// How far the strip reaches, metres.
 const SWATH_M: f32 = 1.6;
 /// Deceleration counted on for stopping, metres a second squared: half of what FACTS 2 allows.
@@ -153,7 +157,11 @@ pub struct Steer {
 /// Remembers what makes one decision follow from the last.
 #[derive(Clone, Debug)]
 pub struct Steering {
-    vfh: Vfh,
+    /// With room on each side, and with as little as is allowed.
+    roomy: Vfh,
+    tight: Vfh,
+    /// The last decision left as little.
+    squeezing: bool,
     craft: Craft,
     heading: f32,
     speed: f32,
@@ -166,14 +174,19 @@ impl Steering {
     /// # Errors
     /// A vehicle that the histogram cannot be made for.
     pub fn new(craft: Craft) -> Result<Self, ConfigError> {
-        let flight = VfhConfig::flight(craft.radius_m);
-        let vfh = Vfh::new(VfhConfig { clearance_m: craft.radius_m + VALLEY_MARGIN_M, ..flight })?;
-        Ok(Self { vfh, craft, heading: f32::NAN, speed: 0.0, blocked: false })
+        let vfh = |margin_m: f32| {
+            let flight = VfhConfig::flight(craft.radius_m);
+            Vfh::new(VfhConfig { clearance_m: craft.radius_m + margin_m, ..flight })
+        };
+        let (roomy, tight) = (vfh(ROOMY_M)?, vfh(TIGHT_M)?);
+        Ok(Self { roomy, tight, squeezing: false, craft, heading: f32::NAN, speed: 0.0, blocked: false })
     }
 
     /// Starts afresh: the next wished heading is the present one, the speed grows from nothing.
     pub fn forget(&mut self) {
-        self.vfh.forget();
+        self.roomy.forget();
+        self.tight.forget();
+        self.squeezing = false;
         self.heading = f32::NAN;
         self.speed = 0.0;
         self.blocked = false;
@@ -228,26 +241,37 @@ impl Steering {
         if !self.heading.is_finite() {
             self.heading = place.heading;
         }
-        let free = |direction: f32| {
-            let half_width = self.craft.radius_m + SWATH_MARGIN_M;
+        let radius_m = self.craft.radius_m;
+        let free = |direction: f32, margin_m: f32| {
             let from = (place.x, place.y);
+            let half_width = radius_m + margin_m;
             free_length(scene.cells, &scene.window, from, direction, half_width, SWATH_M, STANDS_CERTAINTY)
         };
         let (target_rad, target_m) = aim.map_or((f32::NAN, f32::NAN), |aim| {
             ((aim.y - place.y).atan2(aim.x - place.x), place.distance((aim.x, aim.y)))
         });
-        let on_line = free(target_rad);
-        let decision = self.vfh.decide(
-            &Situation {
-                cells: scene.cells,
-                walls: scene.walls,
-                target_rad,
-                // What stands on the way is gone round first: the walls behind it close no way past it.
-                target_m: target_m.min(on_line),
-                max_speed_m_s: self.craft.cruise_m_s,
-            },
-            histogram,
-        );
+        let mut margin_m = ROOMY_SWATH_M;
+        let mut on_line = free(target_rad, margin_m);
+        let mut situation = Situation {
+            cells: scene.cells,
+            walls: scene.walls,
+            target_rad,
+            // What stands on the way is gone round first: the walls behind it close no way past it.
+            target_m: target_m.min(on_line),
+            max_speed_m_s: self.craft.cruise_m_s,
+        };
+        let mut decision = self.roomy.decide(&situation, histogram);
+        let squeezing = decision.reason == Reason::Blocked;
+        if squeezing {
+            if !self.squeezing {
+                self.tight.forget();
+            }
+            margin_m = TIGHT_SWATH_M;
+            on_line = free(target_rad, margin_m);
+            situation.target_m = target_m.min(on_line);
+            decision = self.tight.decide(&situation, histogram);
+        }
+        self.squeezing = squeezing;
         let mut steer = Steer {
             velocity: (0.0, 0.0),
             heading: wrap(self.heading + scan(config, scene.now)),
@@ -271,7 +295,7 @@ impl Steering {
             _ if narrow && on_line - reserve > wanted => {
                 (target_rad, self.craft.cruise_m_s, SteeringReason::TargetSafe, on_line)
             }
-            Some(direction) => (direction, decision.speed_m_s, reason_of(decision.reason), free(direction)),
+            Some(direction) => (direction, decision.speed_m_s, reason_of(decision.reason), free(direction, margin_m)),
             None => (target_rad, 0.0, SteeringReason::Blocked, on_line),
         };
         steer.free_m = free_m;

@@ -1,6 +1,7 @@
 //! What the set says, summed up.
 
-use crate::maths::wrap_angle;
+use crate::filter::BLOCK;
+use crate::maths::{LANES, wrap_angle};
 use crate::particles::ParticlesRef;
 
 /// How far the estimate may be trusted.
@@ -88,10 +89,10 @@ pub(crate) fn state(p_lost: f32, sigma: f32, share: f32) -> State {
     }
 }
 
-/// Accumulators side by side, so that the sums vectorise.
-const LANES: usize = 8;
 /// Columns that are summed.
 const COLUMNS: usize = 7;
+/// The one of them that is an angle.
+const TURNING: usize = 4;
 
 /// Weighted first and second moments of the columns, taken about an origin inside the set so that
 /// single precision suffices.
@@ -104,44 +105,65 @@ struct Moments {
     xy: f64,
 }
 
+/// Adds a column's weighted moments about `origin`, lane by lane.
+#[inline]
+fn add(
+    weight: &[f32],
+    column: &[f32],
+    about: impl Fn(f32) -> f32,
+    sum: &mut [f32; LANES],
+    square: &mut [f32; LANES],
+) {
+    let mut add = |weights: &[f32], values: &[f32]| {
+        for (lane, (w, v)) in weights.iter().zip(values).enumerate().take(LANES) {
+            let d = about(*v);
+            sum[lane] += w * d;
+            square[lane] += w * d * d;
+        }
+    };
+    let ((weights, w), (values, v)) = (weight.as_chunks::<LANES>(), column.as_chunks::<LANES>());
+    for (w, v) in weights.iter().zip(values) {
+        add(w, v);
+    }
+    add(w, v);
+}
+
 fn moments(p: &ParticlesRef<'_>, origin: &[f32; COLUMNS], near: Option<(f32, f32, f32)>) -> Moments {
+    let columns = [p.x, p.y, p.velocity_x, p.velocity_y, p.heading_offset, p.level_roll, p.level_pitch];
     let mut sum = [[0.0f32; LANES]; COLUMNS];
     let mut square = [[0.0f32; LANES]; COLUMNS];
     let (mut weight, mut weight2, mut xy) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
-    // Without a centre everything is near.
-    let (cx, cy, radius) = near.unwrap_or((0.0, 0.0, f32::INFINITY));
-    let radius2 = radius * radius;
-    let mut at = |i: usize, lane: usize| {
-        let (dx, dy) = (p.x[i] - cx, p.y[i] - cy);
-        let w = if dx * dx + dy * dy <= radius2 { p.weight[i] } else { 0.0 };
-        let d = [
-            p.x[i] - origin[0],
-            p.y[i] - origin[1],
-            p.velocity_x[i] - origin[2],
-            p.velocity_y[i] - origin[3],
-            wrap_angle(p.heading_offset[i] - origin[4]),
-            p.level_roll[i] - origin[5],
-            p.level_pitch[i] - origin[6],
-        ];
-        for k in 0..COLUMNS {
-            sum[k][lane] += w * d[k];
-            square[k][lane] += w * d[k] * d[k];
+    let (mut weights, mut across) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+    let mut from = 0;
+    while from < p.len() {
+        let to = (from + BLOCK).min(p.len());
+        let (weights, across) = (&mut weights[..to - from], &mut across[..to - from]);
+        let (x, y) = (&p.x[from..to], &p.y[from..to]);
+        weights.copy_from_slice(&p.weight[from..to]);
+        if let Some((cx, cy, radius)) = near {
+            for (w, (x, y)) in weights.iter_mut().zip(x.iter().zip(y)) {
+                let (dx, dy) = (x - cx, y - cy);
+                *w = if dx * dx + dy * dy <= radius * radius { *w } else { 0.0 };
+            }
         }
-        xy[lane] += w * d[0] * d[1];
-        weight[lane] += w;
-        weight2[lane] += w * w;
-    };
-    let n = p.len();
-    let whole = n - n % LANES;
-    let mut i = 0;
-    while i < whole {
-        for lane in 0..LANES {
-            at(i + lane, lane);
+        for (k, column) in columns.iter().enumerate() {
+            let (column, origin) = (&column[from..to], origin[k]);
+            let (sum, square) = (&mut sum[k], &mut square[k]);
+            if k == TURNING {
+                add(weights, column, |v| wrap_angle(v - origin), sum, square);
+            } else {
+                add(weights, column, |v| v - origin, sum, square);
+            }
         }
-        i += LANES;
-    }
-    for i in whole..n {
-        at(i, i - whole);
+        for (across, (x, y)) in across.iter_mut().zip(x.iter().zip(y)) {
+            *across = (x - origin[0]) * (y - origin[1]);
+        }
+        add(weights, across, |v| v, &mut xy, &mut [0.0; LANES]);
+        for (lane, w) in weights.iter().enumerate() {
+            weight[lane % LANES] += w;
+            weight2[lane % LANES] += w * w;
+        }
+        from = to;
     }
     let total = |lanes: &[f32; LANES]| lanes.iter().map(|l| f64::from(*l)).sum::<f64>();
     let w = total(&weight);

@@ -4,6 +4,7 @@ use crate::config::{Config, ConfigError};
 use crate::estimate::{Estimate, Summary};
 use crate::generator::{Generator, Lanes};
 use crate::map::RangeMap;
+use crate::maths::sum;
 use crate::motion::{Motion, NOISE_ROWS, Step};
 use crate::particles::{ParticlesMut, ParticlesRef};
 use crate::resample::draw_ancestors;
@@ -211,11 +212,11 @@ impl<M: RangeMap> Filter<M> {
                 }
             }
             step.apply(&mut block, &self.noise);
-            prior += block.weight.iter().sum::<f32>();
+            prior += sum(block.weight);
             if sweep.is_some() {
                 self.beams.weigh(&self.map, block.x, block.y, block.heading_offset, block.weight);
             }
-            total += block.weight.iter().sum::<f32>();
+            total += sum(block.weight);
             from = to;
         }
 

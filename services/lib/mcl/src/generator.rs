@@ -96,10 +96,11 @@ impl SeedableRng for Generator {
     }
 }
 
-/// Generators side by side: one instruction serves several of them.
-const LANES: usize = 8;
+/// Generators side by side: one instruction serves several of them. So many that the compiler keeps the loops over
+/// them, which it turns into vector instructions, instead of writing each lane out.
+const LANES: usize = 32;
 
-/// Eight xoshiro128++ side by side, seeded from a [`Generator`] for the length of one update: only adds,
+/// Many xoshiro128++ side by side, seeded from a [`Generator`] for the length of one update: only adds,
 /// shifts and exclusive-ors on 32-bit words, which every vector unit has.
 pub(crate) struct Lanes([[u32; LANES]; 4]);
 
@@ -122,15 +123,18 @@ impl Lanes {
     pub(crate) fn fill_normal(&mut self, out: &mut [f32]) {
         // A byte has variance (256² - 1) / 12; four of them have the mean 510.
         const SCALE: f32 = 0.006_765_814; // 1 / sqrt(4 · 65535 / 12)
-        for chunk in out.chunks_mut(LANES) {
-            let words = self.next();
-            let mut draws = [0.0f32; LANES];
-            for (draw, word) in draws.iter_mut().zip(words) {
-                let pairs = (word & 0x00ff_00ff) + ((word >> 8) & 0x00ff_00ff);
-                let sum = ((pairs & 0xffff) + (pairs >> 16)).cast_signed();
-                *draw = (sum - 510) as f32 * SCALE;
+        let draw = |word: u32| {
+            let pairs = (word & 0x00ff_00ff) + ((word >> 8) & 0x00ff_00ff);
+            (((pairs & 0xffff) + (pairs >> 16)).cast_signed() - 510) as f32 * SCALE
+        };
+        let (whole, rest) = out.as_chunks_mut::<LANES>();
+        for chunk in whole {
+            *chunk = self.next().map(draw);
+        }
+        if !rest.is_empty() {
+            for (out, word) in rest.iter_mut().zip(self.next()) {
+                *out = draw(word);
             }
-            chunk.copy_from_slice(&draws[..chunk.len()]);
         }
     }
 

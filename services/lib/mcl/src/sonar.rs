@@ -3,7 +3,7 @@
 use crate::SonarConfig;
 use crate::filter::BLOCK;
 use crate::map::RangeMap;
-use crate::maths::{exp_minus, power, sin_cos};
+use crate::maths::{exp_minus, power, sin_cos, sum};
 use core::f32::consts::TAU;
 
 /// Most readings weighed at once; more are ignored.
@@ -306,13 +306,12 @@ impl Beams {
                 &axis_sin[..n],
                 &mut expected[..n],
             );
-            let mut evidence = 0.0;
             for i in 0..n {
                 let factor = beam.factor[entry(expected[i] * self.scale)];
                 product[i] *= factor;
-                evidence += weight[i] * factor;
+                expected[i] = weight[i] * factor;
             }
-            beam.evidence += evidence;
+            beam.evidence += sum(&expected[..n]);
         }
         let temper = self.model.config.temper;
         for i in 0..n {

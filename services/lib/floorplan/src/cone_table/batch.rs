@@ -1,10 +1,13 @@
 //! Many look-ups at once, in loops that vectorise.
 
-use super::{ConeTable, EMPTY, HEADINGS, NO_ECHO, TILE};
+use super::{ConeTable, EMPTY, HEADINGS, NO_ECHO, TILE, TILE_BYTES};
 use std::sync::atomic::Ordering;
 
 /// Look-ups worked on together: the intermediate columns stay in the first-level cache.
 const BLOCK: usize = 128;
+/// A tile's side is a power of two.
+const TILE_BITS: u32 = TILE.trailing_zeros();
+const TILE_MASK: i32 = (1 << TILE_BITS) - 1;
 /// 1.5 · 2²³: adding it to an `f32` below 2²² in size rounds it to the nearest integer, found in the low
 /// bits. A cast that saturates, or `floor`, costs more than the look-up itself.
 const ROUND: f32 = 12_582_912.0;
@@ -21,6 +24,7 @@ struct Frame {
     origin: (f32, f32),
     inverse_pitch: f32,
     limit: (f32, f32),
+    tiles_x: i32,
 }
 
 impl ConeTable {
@@ -35,6 +39,7 @@ impl ConeTable {
             origin: self.plan.origin(),
             inverse_pitch: self.inverse_pitch,
             limit: (self.width as f32, self.height as f32),
+            tiles_x: self.tiles_x as i32,
         };
         let mut from = 0;
         while from < n {
@@ -53,7 +58,8 @@ impl ConeTable {
         let n = out.len().min(BLOCK);
         let (x, y, angle, cos, sin) = (&x[..n], &y[..n], &angle[..n], &cos[..n], &sin[..n]);
         let out = &mut out[..n];
-        let (mut column, mut row, mut heading) = ([0i32; BLOCK], [0i32; BLOCK], [0i32; BLOCK]);
+        // Which tile, and which byte of it.
+        let (mut tile, mut byte) = ([0i32; BLOCK], [0i32; BLOCK]);
         let mut value = [NO_ECHO; BLOCK];
         for i in 0..n {
             let fx = (x[i] - frame.origin.0) * frame.inverse_pitch;
@@ -63,8 +69,8 @@ impl ConeTable {
             let (fx, fy) = if inside { (fx, fy) } else { (0.5, 0.5) };
             let (middle_x, ix) = round(fx - 0.5);
             let (middle_y, iy) = round(fy - 0.5);
-            column[i] = if inside { ix } else { -1 };
-            row[i] = iy;
+            let (tx, ty) = (ix >> TILE_BITS, iy >> TILE_BITS);
+            tile[i] = if inside { ty * frame.tiles_x + tx } else { -1 };
             // How much nearer the middle of the cell is to what lies ahead, metres.
             let off_x = (fx - 0.5 - middle_x) * self.pitch;
             let off_y = (fy - 0.5 - middle_y) * self.pitch;
@@ -72,14 +78,12 @@ impl ConeTable {
             let turns = angle[i] * TURNS;
             let part = turns - round(turns).0;
             let k = round(part * HEADINGS as f32).1;
-            heading[i] = if k < 0 { k + HEADINGS as i32 } else { k };
+            let k = if k < 0 { k + HEADINGS as i32 } else { k };
+            let place = ((iy & TILE_MASK) << TILE_BITS) + (ix & TILE_MASK);
+            byte[i] = place * HEADINGS as i32 + k;
         }
         for i in 0..n {
-            if let (Ok(px), Ok(py), Ok(k)) =
-                (usize::try_from(column[i]), usize::try_from(row[i]), usize::try_from(heading[i]))
-            {
-                value[i] = self.stored(px, py, k);
-            }
+            value[i] = self.stored(tile[i].cast_unsigned() as usize, byte[i].cast_unsigned() as usize);
         }
         for i in 0..n {
             let range = (f32::from(value[i]) - 1.0) * self.level_m + out[i];
@@ -87,28 +91,28 @@ impl ConeTable {
         }
     }
 
-    /// The byte of a place and heading, worked out if need be; no echo for what is off the table.
+    /// A byte of a tile, worked out if need be; no echo for what is off the table.
     #[inline]
-    fn stored(&self, px: usize, py: usize, heading: usize) -> u8 {
-        let (tx, ty) = (px / TILE, py / TILE);
-        let Some(tile) = self.tiles.get(ty * self.tiles_x + tx) else { return NO_ECHO };
-        let first = ((py % TILE) * TILE + px % TILE) * HEADINGS;
-        let known = tile.get().and_then(|values| values.get(first + heading));
+    fn stored(&self, tile: usize, byte: usize) -> u8 {
+        let Some(values) = self.tiles.get(tile) else { return NO_ECHO };
+        let known = values.get().and_then(|values| values.get(byte));
         match known.map_or(EMPTY, |value| value.load(Ordering::Relaxed)) {
-            EMPTY => self.work_out(px, py, heading),
+            EMPTY => self.work_out(tile, byte),
             value => value,
         }
     }
 
     #[cold]
-    fn work_out(&self, px: usize, py: usize, heading: usize) -> u8 {
-        if px >= self.width || py >= self.height || heading >= HEADINGS {
+    fn work_out(&self, tile: usize, byte: usize) -> u8 {
+        let (tx, ty) = (tile % self.tiles_x, tile / self.tiles_x);
+        let place = byte / HEADINGS;
+        let (px, py) = (tx * TILE + place % TILE, ty * TILE + place / TILE);
+        if px >= self.width || py >= self.height || byte >= TILE_BYTES {
             return NO_ECHO;
         }
-        let first = ((py % TILE) * TILE + px % TILE) * HEADINGS;
-        let values = &self.tile(px / TILE, py / TILE)[first..first + HEADINGS];
+        let values = &self.tile(tx, ty)[place * HEADINGS..][..HEADINGS];
         self.fill((px, py), values);
-        values[heading].load(Ordering::Relaxed)
+        values[byte % HEADINGS].load(Ordering::Relaxed)
     }
 }
 
