@@ -108,8 +108,14 @@ message! {
         pub velocity_x_m_s: f32,
         /// The same, left.
         pub velocity_y_m_s: f32,
-        /// Standard deviation of each component.
+        /// Standard deviation of each component, of whichever of the two velocities there is.
         pub sigma_m_s: f32,
+        /// Where the quality gate refused the frame: the velocity as it would be if the sensor had told all
+        /// motion apart, body frame forward. Over a poor floor it under-reports, by an unknown share. NaN when
+        /// the frame is good, shows nothing at all or has no height.
+        pub dim_x_m_s: f32,
+        /// The same, left.
+        pub dim_y_m_s: f32,
         /// Image motion as the sensor sent it, body x, radians a second.
         pub raw_x_rad_s: f32,
         /// Image motion as the sensor sent it, body y, radians a second.

@@ -135,8 +135,10 @@ fn fly(setup: &Setup, seed: u64, keep: usize) -> Result<String> {
             aloft += 1;
             wrong += u32::from(off > HEIGHT_OFF_M);
             worst = worst.max(off);
-            let (x, y) =
-                (line.pose.velocity_x_m_s - truth.velocity_x_m_s, line.pose.velocity_y_m_s - truth.velocity_y_m_s);
+            let (x, y) = (
+                line.pose.velocity_x_m_s - truth.velocity_x_m_s,
+                line.pose.velocity_y_m_s - truth.velocity_y_m_s,
+            );
             let (sum, count) = &mut swerves[usize::from(line.flow.quality < 60)];
             *sum += x * x + y * y;
             *count += 1;

@@ -6,6 +6,10 @@ use ipc_types::{Attitude, FlowMotion};
 use msp::messages::{FlowFrame, RangeFrame};
 use msp::{Decoder, Frame, Layout, Reader, Request};
 
+/// Frames of less quality show nothing at all.
+const LEAST_QUALITY: u8 = 10;
+/// Noise of a refused frame over that of a good one: the counts come from a few weak features.
+const DIM_NOISE: f32 = 3.0;
 /// A frame of 18 bytes at 115200 baud, and half a tick of 5 ms until it is read.
 const ON_THE_WAY_NS: u64 = 4_000_000;
 /// A frame waits so long for an attitude from after its end, then goes with what there is.
@@ -188,14 +192,17 @@ impl Motion {
             velocity_x_m_s: f32::NAN,
             velocity_y_m_s: f32::NAN,
             sigma_m_s: f32::NAN,
+            dim_x_m_s: f32::NAN,
+            dim_y_m_s: f32::NAN,
             raw_x_rad_s: raw_x,
             raw_y_rad_s: raw_y,
             range_m: self.range.map_or(f32::NAN, |(_, range)| range),
             quality: frame.quality.into(),
             ..FlowMotion::default()
         };
-        let good = frame.quality >= self.config.min_quality && raw_x.hypot(raw_y) < FASTEST_RAD_S;
-        let Some(tilt) = self.tilts.between(start_ns, waiting.end_ns).filter(|_| good) else { return motion };
+        let good = frame.quality >= self.config.min_quality;
+        let told = frame.quality >= LEAST_QUALITY && raw_x.hypot(raw_y) < FASTEST_RAD_S;
+        let Some(tilt) = self.tilts.between(start_ns, waiting.end_ns).filter(|_| told) else { return motion };
         let upright = tilt.roll_rad.cos() * tilt.pitch_rad.cos();
         if upright < (self.config.max_tilt_deg as f32).to_radians().cos() {
             return motion;
@@ -206,8 +213,12 @@ impl Motion {
         let turning = tilt.roll_rate.hypot(tilt.pitch_rate);
         let unsure = if tilt.extrapolated { 3.0 * TURN_SHARE } else { TURN_SHARE };
         let angular = distance * (self.config.noise_rad_s as f32).hypot(unsure * turning);
-        motion.velocity_x_m_s = forward;
-        motion.velocity_y_m_s = left;
+        if good {
+            (motion.velocity_x_m_s, motion.velocity_y_m_s) = (forward, left);
+        } else {
+            (motion.dim_x_m_s, motion.dim_y_m_s) = (forward, left);
+        }
+        let angular = if good { angular } else { DIM_NOISE * angular };
         motion.sigma_m_s = angular.hypot(share * forward.hypot(left));
         motion
     }

@@ -140,12 +140,19 @@ fn tilted_flight_is_levelled() {
 #[test]
 fn what_cannot_be_trusted_is_refused_and_counted() {
     let pose = |t: f64| Pose { position: [0.5 * t, 0.0, 1.2], roll: 0.0, pitch: 0.0 };
-    for (quality, with_range) in [(40, true), (120, false)] {
+    for (quality, with_range) in [(5, true), (120, false)] {
         let motions = fly(SENSOR, quality, with_range, pose);
         assert!(motions.len() > 10);
-        assert!(motions.iter().all(|m| m.velocity_x_m_s.is_nan() && m.sigma_m_s.is_nan()));
+        let silent = |m: &FlowMotion| [m.velocity_x_m_s, m.dim_x_m_s, m.sigma_m_s].iter().all(|v| v.is_nan());
+        assert!(motions.iter().all(silent));
         assert_eq!(last(&motions).refused as usize, motions.len());
     }
+    // A poor picture is refused as well, but what it shows is told apart from nothing, and less surely.
+    let (poor, good) = (fly(SENSOR, 40, true, pose), fly(SENSOR, 120, true, pose));
+    let (poor, good) = (last(&poor), last(&good));
+    assert!(poor.velocity_x_m_s.is_nan() && poor.velocity_y_m_s.is_nan() && good.dim_x_m_s.is_nan());
+    assert!((poor.dim_x_m_s - good.velocity_x_m_s).abs() < 1e-3, "{poor:?}");
+    assert!(poor.refused > 10 && poor.sigma_m_s > 2.0 * good.sigma_m_s, "{poor:?}");
     // Too near to the ground for the sensor, and tilted too far.
     let low = |t: f64| Pose { position: [0.1 * t, 0.0, 0.05], roll: 0.0, pitch: 0.0 };
     assert!(last(&fly(SENSOR, 120, true, low)).velocity_x_m_s.is_nan());

@@ -9,6 +9,7 @@ mod config;
 mod flow;
 mod pose;
 mod predict;
+mod rate;
 mod service;
 mod set;
 mod start;

@@ -2,7 +2,7 @@
 
 use crate::LocalizationConfig;
 use crate::attitude::{Attitudes, seconds};
-use crate::flow::Flows;
+use crate::flow::{Flows, Frame};
 use crate::pose::{Walls, fill};
 use crate::predict::{Dynamics, predict};
 use crate::set::{MEMORY_GROUNDED, Set, columns, columns_mut, fold};
@@ -201,6 +201,7 @@ impl Localization {
         while let Some(frame) = self.flow.receive() {
             let velocity = [frame.velocity_x_m_s, frame.velocity_y_m_s];
             if velocity.iter().any(|v| v.is_nan()) {
+                self.glimpse(now, &frame);
                 continue;
             }
             if frame.sampled_ns > now || !self.flows.push(frame.sampled_ns, velocity, frame.sigma_m_s) {
@@ -230,6 +231,18 @@ impl Localization {
                 self.refused += 1;
             }
         }
+    }
+
+    /// A frame from over a poor floor says something about the velocity, but too little to weigh particles by.
+    fn glimpse(&mut self, now: u64, frame: &FlowMotion) {
+        let velocity = [frame.dim_x_m_s, frame.dim_y_m_s];
+        let sane = velocity.iter().all(|v| v.abs() < 10.0) && (1e-3..=5.0).contains(&frame.sigma_m_s);
+        let Some(b) = self.believed.filter(|_| sane && frame.sampled_ns > 0 && frame.sampled_ns <= now)
+        else {
+            return;
+        };
+        let frame = Frame { time_ns: frame.sampled_ns, velocity, sigma: frame.sigma_m_s };
+        self.velocity.dim(&frame, &self.attitudes, &self.frames(&b));
     }
 
     /// Whether the last set sent has come back, or is not to be waited for any longer.
@@ -350,7 +363,8 @@ impl Localization {
         let (e, frames) = (&believed.estimate, self.frames(&believed));
         if let Some(group) = group {
             let (place, velocity) = ([e.x, e.y], [e.velocity_x, e.velocity_y]);
-            self.velocity.place(time_ns, place, velocity, &self.attitudes, &frames);
+            let spread = [e.variance_x, e.variance_y].map(f32::sqrt);
+            self.velocity.place(time_ns, place, spread, velocity, &self.attitudes, &frames);
             // Only where the walls are known to be the ones meant.
             let sure = e.sigma() < SURE_M;
             let plan = self.table.plan();

@@ -1,6 +1,6 @@
 //! Ping groups waiting for their update.
 
-use crate::velocity::Ranged;
+use crate::rate::Ranged;
 use ipc_types::{MAX_SONARS, SonarHealth, SonarRanges, SonarReading, SonarStatus};
 use mcl::{Echo, Reading};
 

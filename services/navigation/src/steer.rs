@@ -295,7 +295,9 @@ impl Steering {
             _ if narrow && on_line - reserve > wanted => {
                 (target_rad, self.craft.cruise_m_s, SteeringReason::TargetSafe, on_line)
             }
-            Some(direction) => (direction, decision.speed_m_s, reason_of(decision.reason), free(direction, margin_m)),
+            Some(direction) => {
+                (direction, decision.speed_m_s, reason_of(decision.reason), free(direction, margin_m))
+            }
             None => (target_rad, 0.0, SteeringReason::Blocked, on_line),
         };
         steer.free_m = free_m;
