@@ -98,11 +98,9 @@ impl Velocity {
             return;
         }
         self.advance(frame.time_ns, attitudes, frames);
-        let yaw = attitudes.at(frame.time_ns).unwrap_or_default().yaw + frames.heading_offset;
-        let (sin, cos) = yaw.sin_cos();
-        let [x, y] = frame.velocity;
+        let [x, y] = in_plan(frame, attitudes, frames);
         // A frame from before the state's time is a little old; the gust since then is not worth a replay.
-        let miss = [cos * x - sin * y - self.state[0][1], sin * x + cos * y - self.state[1][1]];
+        let miss = [x - self.state[0][1], y - self.state[1][1]];
         let spread = frame.sigma * frame.sigma + self.variance[0][1][1].max(self.variance[2][1][1]);
         let sigma = frame.sigma * (1.0 + FLOW_TAIL * (miss[0] * miss[0] + miss[1] * miss[1]) / spread).sqrt();
         // The floor is another one: what was learned of a poor one is forgotten.
@@ -120,10 +118,7 @@ impl Velocity {
             return;
         }
         self.advance(frame.time_ns, attitudes, frames);
-        let yaw = attitudes.at(frame.time_ns).unwrap_or_default().yaw + frames.heading_offset;
-        let (sin, cos) = yaw.sin_cos();
-        let [x, y] = frame.velocity;
-        for (axis, shown) in [cos * x - sin * y, sin * x + cos * y].into_iter().enumerate() {
+        for (axis, shown) in in_plan(frame, attitudes, frames).into_iter().enumerate() {
             let velocity = self.state[axis][1];
             let mut along = [0.0; 2];
             along[axis] = self.share;
@@ -252,6 +247,14 @@ impl Velocity {
         }
         self.time_ns = to_ns.max(self.time_ns);
     }
+}
+
+/// The velocity of a frame, which is in the body's, in the plan's.
+fn in_plan(frame: &Frame, attitudes: &Attitudes, frames: &Frames) -> [f32; 2] {
+    let yaw = attitudes.at(frame.time_ns).unwrap_or_default().yaw + frames.heading_offset;
+    let (sin, cos) = yaw.sin_cos();
+    let [x, y] = frame.velocity;
+    [cos * x - sin * y, sin * x + cos * y]
 }
 
 /// F P F'.
