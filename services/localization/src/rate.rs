@@ -23,6 +23,9 @@ const SLOPE_M: f32 = 0.1;
 /// that share of the motion across, and nothing quite stands still, metres a second.
 const SLANT: f32 = 0.2;
 const THING_M_S: f32 = 0.05;
+/// Nearer than this, metres, it is propeller wash in the airframe, which stands still for ever and so would say that the
+/// drone does: a sensor sits about 0.06 m from the middle of a disc of 0.225 m.
+const NEAREST_M: f32 = 0.15;
 /// A body that has turned farther between two pings hears another part of the thing, radians.
 const TURNED_RAD: f32 = 0.4;
 
@@ -106,7 +109,8 @@ impl Velocity {
             let (sin, cos) = (heading + ranged.bearing).sin_cos();
             let slant = THING_M_S.hypot(SLANT * self.state[0][1].hypot(self.state[1][1]));
             let turned = mcl::wrap_angle(heading - last.heading).abs();
-            (turned < TURNED_RAD).then_some(([-cos, -sin], change + cos * gone[0] + sin * gone[1], slant))
+            let answers = turned < TURNED_RAD && ranged.range > NEAREST_M && last.range > NEAREST_M;
+            answers.then_some(([-cos, -sin], change + cos * gone[0] + sin * gone[1], slant))
         };
         let Some((normal, error, slant)) = wall().or_else(thing) else { return };
         let unsure = [0, 1].map(|axis| self.variance[2 * axis][1][1]).iter().sum::<f32>().max(0.0).sqrt();
@@ -190,5 +194,22 @@ mod tests {
         }
         let ([vx, vy], _) = velocity.at(1300 * MS, &attitudes, &frames).unwrap();
         assert!((vx - 0.3).abs() < 0.05 && vy.abs() < 1e-3, "{vx} {vy}");
+    }
+
+    #[test]
+    fn wash_in_the_airframe_is_nothing_that_stands_there() {
+        // 0.3 m/s over a floor that shows nothing: an echo from between the propellers never changes.
+        let (attitudes, frames) = (level(), Frames::default());
+        let believed = |range: f32| {
+            let mut velocity = Velocity::default();
+            velocity.begin(100 * MS, [0.0; 2], [0.3, 0.0]);
+            for i in 0..5u64 {
+                let ranged = Ranged { sensor: 0, range, mount: [0.06, 0.0], bearing: 0.0 };
+                velocity.range((100 + 240 * i) * MS, &ranged, &attitudes, &frames, |_, _, _| None);
+            }
+            velocity.state[0][1]
+        };
+        assert!((believed(0.05) - 0.3).abs() < 1e-3, "{}", believed(0.05));
+        assert!(believed(0.5) < 0.1, "what stands there and comes no nearer is believed: {}", believed(0.5));
     }
 }
