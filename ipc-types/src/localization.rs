@@ -43,6 +43,11 @@ message! {
         pub heading_sigma_rad: f32,
         /// Standard deviation of each velocity component.
         pub velocity_sigma_m_s: f32,
+        /// Acceleration that the tilt does not explain (moving air, errors of the attitude), plan frame; NaN when
+        /// nothing is known of it.
+        pub air_x_m_s2: f32,
+        /// See `air_x_m_s2`.
+        pub air_y_m_s2: f32,
         /// Plan heading minus compass yaw: to be added to `flight/attitude` yaw.
         pub heading_offset_rad: f32,
         /// What the controller's roll reads when the body is level.

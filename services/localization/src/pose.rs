@@ -40,6 +40,7 @@ pub(crate) fn fill(pose: &mut Pose, now: u64, e: &Estimate, p: &Predicted, parti
     pose.variance_y_m2 = e.variance_y + p.variance;
     pose.heading_sigma_rad = e.heading_sigma;
     pose.velocity_sigma_m_s = p.velocity_sigma;
+    [pose.air_x_m_s2, pose.air_y_m_s2] = p.air;
     pose.heading_offset_rad = e.heading_offset;
     pose.level_roll_rad = e.level_roll;
     pose.level_pitch_rad = e.level_pitch;

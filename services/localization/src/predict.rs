@@ -28,6 +28,8 @@ pub(crate) struct Predicted {
     pub(crate) heading: f32,
     /// Standard deviation of the velocity.
     pub(crate) velocity_sigma: f32,
+    /// Acceleration by what the tilt does not explain, m/s²; NaN when nothing is known of it.
+    pub(crate) air: [f32; 2],
     /// What the prediction adds to each position variance, m².
     pub(crate) variance: f32,
 }
@@ -77,6 +79,7 @@ pub(crate) fn predict(
         velocity,
         heading: mcl::wrap_angle(yaw + e.heading_offset),
         velocity_sigma: variance.sqrt(),
+        air: [f32::NAN; 2],
         variance: variance * (horizon * horizon) as f32,
     }
 }

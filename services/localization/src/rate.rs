@@ -146,7 +146,7 @@ mod tests {
                 assert!((velocity.state[0][1] - 0.3).abs() < 0.05, "{:?}", velocity.state);
             }
         }
-        let ([vx, vy], _) = velocity.at(1300 * MS, &attitudes, &frames).unwrap();
+        let [vx, vy] = velocity.at(1300 * MS, &attitudes, &frames).unwrap().velocity;
         assert!((vx - 0.3).abs() < 0.03 && vy.abs() < 1e-3, "{vx} {vy}");
         assert!(velocity.variance[0][1][1] < 0.5 * velocity.variance[2][1][1], "{:?}", velocity.variance);
     }
@@ -192,7 +192,7 @@ mod tests {
             let ranged = Ranged { sensor: 0, range, mount: [0.06, 0.0], bearing: 0.0 };
             velocity.range((100 + 240 * i) * MS, &ranged, &attitudes, &frames, |_, _, _| None);
         }
-        let ([vx, vy], _) = velocity.at(1300 * MS, &attitudes, &frames).unwrap();
+        let [vx, vy] = velocity.at(1300 * MS, &attitudes, &frames).unwrap().velocity;
         assert!((vx - 0.3).abs() < 0.05 && vy.abs() < 1e-3, "{vx} {vy}");
     }
 

@@ -394,12 +394,13 @@ impl Localization {
         let dynamics = Dynamics { drag: motion.drag, velocity_noise: motion.velocity_noise };
         let flows = if with_flow { self.flows.waiting() } else { &[] };
         let mut p = predict(&b.estimate, dynamics, b.time_ns, to_ns, &self.attitudes, flows);
-        if let Some((velocity, sigma)) = self.velocity.at(to_ns, &self.attitudes, &self.frames(b)) {
-            (p.velocity, p.velocity_sigma) = (velocity, sigma);
+        if let Some(swept) = self.velocity.at(to_ns, &self.attitudes, &self.frames(b)) {
+            (p.velocity, p.velocity_sigma, p.air) = (swept.velocity, swept.sigma, swept.air);
         }
         if self.grounded {
             p.position = [b.estimate.x, b.estimate.y];
             p.velocity = [0.0; 2];
+            p.air = [f32::NAN; 2];
             p.variance = 0.0;
         }
         p

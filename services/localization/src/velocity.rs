@@ -50,6 +50,17 @@ pub(crate) struct Frames {
     pub(crate) drag: f32,
 }
 
+/// What is flown by.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Swept {
+    /// Plan frame.
+    pub(crate) velocity: [f32; 2],
+    /// Standard deviation of each component.
+    pub(crate) sigma: f32,
+    /// Acceleration that the tilt does not explain, plan frame, m/s².
+    pub(crate) air: [f32; 2],
+}
+
 /// A 3 by 3 block of the covariance.
 pub(crate) type Block = [[f32; 3]; 3];
 
@@ -198,9 +209,9 @@ impl Velocity {
         }
     }
 
-    /// Velocity (plan frame) and its standard deviation at a time after the newest measurement; `None` when
-    /// that was too long ago.
-    pub(crate) fn at(&self, time_ns: u64, attitudes: &Attitudes, frames: &Frames) -> Option<([f32; 2], f32)> {
+    /// Velocity (plan frame), its standard deviation and the air's acceleration at a time after the newest
+    /// measurement; `None` when that was too long ago.
+    pub(crate) fn at(&self, time_ns: u64, attitudes: &Attitudes, frames: &Frames) -> Option<Swept> {
         if !self.is_known(time_ns) {
             return None;
         }
@@ -208,7 +219,12 @@ impl Velocity {
         then.advance(time_ns, attitudes, frames);
         let velocity = [then.state[0][1], then.state[1][1]];
         let variance = then.variance[0][1][1].max(then.variance[2][1][1]).max(0.0);
-        velocity.iter().all(|v| v.is_finite()).then(|| (velocity, variance.sqrt()))
+        let air = [then.state[0][2], then.state[1][2]];
+        velocity.iter().chain(&air).all(|v| v.is_finite()).then(|| Swept {
+            velocity,
+            sigma: variance.sqrt(),
+            air,
+        })
     }
 
     pub(crate) fn advance(&mut self, to_ns: u64, attitudes: &Attitudes, frames: &Frames) {
@@ -291,7 +307,8 @@ pub(crate) mod tests {
             let frame = Frame { time_ns, velocity: [0.5 * 0.04 * i as f32, 0.0], sigma: 0.07 };
             velocity.flow(&frame, &attitudes, &frames);
         }
-        let (v, sigma) = velocity.at((100 + 40 * 29 + 60) * MS, &attitudes, &frames).unwrap();
+        let Swept { velocity: v, sigma, .. } =
+            velocity.at((100 + 40 * 29 + 60) * MS, &attitudes, &frames).unwrap();
         let truth = 0.5 * (0.04 * 29.0 + 0.06);
         assert!((v[0] - truth).abs() < 0.06 * 0.5 && v[1].abs() < 1e-6, "{v:?}, true {truth}");
         assert!((0.01..0.07).contains(&sigma), "{sigma}");
@@ -308,11 +325,11 @@ pub(crate) mod tests {
             velocity.place((100 + 60 * i) * MS, place, [0.0; 2], [0.0; 2], &attitudes, &frames);
             if i == 1 {
                 // The jump across y began it anew.
-                let (v, _) = velocity.at(170 * MS, &attitudes, &frames).unwrap();
+                let v = velocity.at(170 * MS, &attitudes, &frames).unwrap().velocity;
                 assert!(v[0].abs() < 0.05 && v[1].abs() < 0.05, "{v:?}");
             }
         }
-        let (v, _) = velocity.at((100 + 60 * 20) * MS, &attitudes, &frames).unwrap();
+        let v = velocity.at((100 + 60 * 20) * MS, &attitudes, &frames).unwrap().velocity;
         assert!((v[0] - 0.4).abs() < 0.12 && v[1].abs() < 0.02, "{v:?}");
     }
 
@@ -355,7 +372,7 @@ pub(crate) mod tests {
         let mut velocity = Velocity::default();
         assert!(velocity.at(100 * MS, &attitudes, &frames).is_none());
         velocity.begin(100 * MS, [0.0; 2], [0.4, 0.0]);
-        let (v, _) = velocity.at(110 * MS, &attitudes, &frames).unwrap();
+        let v = velocity.at(110 * MS, &attitudes, &frames).unwrap().velocity;
         assert!((v[0] - 0.4).abs() < 0.02, "{v:?}");
         assert!(velocity.at(500 * MS, &attitudes, &frames).is_none());
     }

@@ -4,7 +4,8 @@ use crate::core::{Decided, PilotCore};
 use crate::phases::BLIND_M_S;
 use crate::senses::age_s;
 use control::{
-    Action, Asking, Source, Tilt, Vector, VerticalWish, arbitrate, hold_velocity, stick, wrap_angle, yaw_rate,
+    Action, Asking, Flown, Source, Tilt, Vector, VerticalWish, arbitrate, hold_velocity, stick, wrap_angle,
+    yaw_rate,
 };
 use ipc_types::{ChannelSource, Phase, SetpointKind};
 
@@ -24,6 +25,8 @@ const MOST_VELOCITY_SIGMA: f32 = 0.6;
 const SURE_VELOCITY: f32 = 0.075;
 /// An older pose only reckons the velocity on, seconds: three of them are missing.
 const FRESH_POSE_S: f32 = 0.15;
+/// A draught of which no pose tells any more dies away in this time, seconds: that of the localization's own model.
+const AIR_S: f32 = 1.0;
 /// No wish is flown faster than this many times the vehicle's cruise speed.
 const FASTEST: f32 = 1.2;
 /// A velocity is reckoned on by tilt alone for so long, seconds.
@@ -54,7 +57,7 @@ impl PilotCore {
     fn carry(&mut self, now: u64, dt: f32) {
         let tilt = self.tilt();
         if self.airborne() {
-            let acceleration = tilt.acceleration(self.heading()) + self.velocity.disturbance();
+            let acceleration = tilt.acceleration(self.heading()) + self.velocity.learned() + self.air(now);
             self.motion.predict(now, acceleration.limited(4.0));
             let vertical = self.climb.expected_acceleration(dt, tilt.magnitude(), self.height.climb_m_s());
             self.height.predict(now, vertical);
@@ -62,6 +65,11 @@ impl PilotCore {
             self.motion.predict(now, Vector::ZERO);
             self.height.set(now, 0.0, 0.0, 0.0);
         }
+    }
+
+    /// What the air does, as far as the newest pose tells: it dies away.
+    fn air(&self, now: u64) -> Vector {
+        self.pose.air * (-age_s(self.pose.at, now) / AIR_S).exp()
     }
 
     /// Sticks that hold the body level at a throttle.
@@ -82,10 +90,10 @@ impl PilotCore {
                 roll: self.ground.tilt.roll - level.roll,
                 pitch: self.ground.tilt.pitch - level.pitch,
             };
-            self.velocity.set_disturbance(-more.acceleration(self.heading()));
+            self.velocity.set_learned(-more.acceleration(self.heading()));
             self.trim = self.ground.tilt;
         } else {
-            self.velocity.set_disturbance(Vector::ZERO);
+            self.velocity.set_learned(Vector::ZERO);
             self.trim = level;
         }
     }
@@ -151,7 +159,16 @@ impl PilotCore {
             .iter()
             .find(|(height, _)| clearance < *height)
             .map_or(self.craft.max_tilt_rad, |(_, tilt)| *tilt);
-        let tilt = self.velocity.step(dt, guarded.velocity, velocity, trust, heading, most);
+        let flown = Flown {
+            velocity,
+            trust,
+            air: self.air(now),
+            tilt: self.tilt(),
+            tilt_age_s: age_s(self.attitude.sampled, now),
+            heading,
+            most_tilt_rad: most,
+        };
+        let tilt = self.velocity.step(dt, guarded.velocity, &flown);
         let level = self.level();
         self.learn_trim(dt, level, heading);
         let bound = |angle: f32| angle.clamp(-MOST_TRIM_RAD - most, MOST_TRIM_RAD + most);
@@ -256,7 +273,7 @@ impl PilotCore {
         self.hover_known = true;
         self.height.set(now, height, 0.0, 0.0);
         self.trim = self.level();
-        self.velocity.set_disturbance(Vector::ZERO);
+        self.velocity.set_learned(Vector::ZERO);
         self.hold = None;
         self.hold_heading = Some(wrap_angle(self.heading()));
         self.height_wish_m = self.config.height_m;

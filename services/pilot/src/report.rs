@@ -92,7 +92,7 @@ impl PilotCore {
         out.height_m = self.height.height_m();
         out.climb_m_s = self.height.climb_m_s();
         out.surface_m = self.height.surface_m();
-        let disturbance = self.velocity.disturbance();
+        let disturbance = self.velocity.learned();
         out.disturbance_x_m_s2 = disturbance.x;
         out.disturbance_y_m_s2 = disturbance.y;
         out.hold_x_m = self.hold.map_or(nowhere, |hold| hold.x);

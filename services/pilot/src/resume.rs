@@ -24,7 +24,7 @@ impl PilotCore {
         }
         let trim = |us: f32| if us.is_finite() { stick::angle_of(us).clamp(-0.087, 0.087) } else { 0.0 };
         self.trim = Tilt { roll: trim(state.level_roll_us), pitch: trim(state.level_pitch_us) };
-        self.velocity.set_disturbance(Vector::new(state.disturbance_x_m_s2, state.disturbance_y_m_s2));
+        self.velocity.set_learned(Vector::new(state.disturbance_x_m_s2, state.disturbance_y_m_s2));
         self.hold_heading = state.hold_heading_rad.is_finite().then_some(state.hold_heading_rad);
         self.hold = Vector::new(state.hold_x_m, state.hold_y_m).known();
         self.operator_land = state.cause == ipc_types::FailsafeCause::Operator.code();

@@ -15,6 +15,8 @@ pub(crate) fn age_s(stamp: Option<u64>, now: u64) -> f32 {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct AttitudeSeen {
     pub(crate) at: Option<u64>,
+    /// When the controller was read.
+    pub(crate) sampled: Option<u64>,
     pub(crate) tilt: Tilt,
     pub(crate) yaw: f32,
 }
@@ -25,6 +27,7 @@ impl AttitudeSeen {
         if sane {
             *self = Self {
                 at: Some(message.header.stamp_ns),
+                sampled: Some(message.sampled_ns),
                 tilt: Tilt { roll: message.roll_rad, pitch: message.pitch_rad },
                 yaw: message.yaw_rad,
             };
@@ -41,6 +44,8 @@ pub(crate) struct PoseSeen {
     pub(crate) level: Tilt,
     pub(crate) sigma_m: f32,
     pub(crate) velocity_sigma: f32,
+    /// Acceleration by what the tilt does not explain, plan frame; zero when nothing is known of it.
+    pub(crate) air: Vector,
     pub(crate) p_lost: f32,
     pub(crate) walls: u32,
     pub(crate) state: LocalizationState,
@@ -54,6 +59,7 @@ impl Default for PoseSeen {
             level: Tilt::default(),
             sigma_m: f32::INFINITY,
             velocity_sigma: f32::INFINITY,
+            air: Vector::ZERO,
             p_lost: 1.0,
             walls: 0,
             state: LocalizationState::Lost,
@@ -83,6 +89,7 @@ impl PoseSeen {
             level: Tilt { roll: level(message.level_roll_rad), pitch: level(message.level_pitch_rad) },
             sigma_m: unknown(message.sigma_m(), f32::INFINITY),
             velocity_sigma: unknown(message.velocity_sigma_m_s, f32::INFINITY),
+            air: Vector::new(message.air_x_m_s2, message.air_y_m_s2).known().unwrap_or(Vector::ZERO),
             p_lost: unknown(message.p_lost, 1.0),
             walls: message.walls_in_echo,
             state,

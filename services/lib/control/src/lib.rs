@@ -41,7 +41,7 @@ pub use planar::{Vector, wrap_angle};
 pub use position::{HoldConfig, hold_velocity};
 pub use shield::{Echo, Footing, Guarded, Look, MAX_SENSORS, Shield, ShieldConfig};
 pub use touchdown::{TouchDown, TouchDownConfig};
-pub use velocity::{Tilt, VelocityConfig, VelocityController};
+pub use velocity::{Flown, Tilt, VelocityConfig, VelocityController};
 pub use way_home::WayHome;
 
 /// Standard gravity, m/s2.

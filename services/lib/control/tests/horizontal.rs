@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use control::{
-    Braking, HoldConfig, Motion, MotionConfig, Tilt, Vector, VelocityConfig, VelocityController,
+    Braking, Flown, HoldConfig, Motion, MotionConfig, Tilt, Vector, VelocityConfig, VelocityController,
     hold_velocity,
 };
 use std::collections::VecDeque;
@@ -79,14 +79,23 @@ impl Flight {
         }
         // The measured attitude contains the level error: the pilot does not know it.
         let seen = Tilt { roll: self.tilt.roll - self.level.roll, pitch: self.tilt.pitch - self.level.pitch };
-        let acceleration = seen.acceleration(self.heading) + self.control.disturbance();
+        let acceleration = seen.acceleration(self.heading) + self.control.learned();
         self.motion.predict(self.now_ns, acceleration);
         let wish =
             wish.unwrap_or_else(|| hold_velocity(&HoldConfig::default(), hold.unwrap(), self.motion.place()));
         let most = 10f32.to_radians();
         // As the pilot does: old poses are not trusted.
         let trust = if self.motion.age_s(self.now_ns) > 0.25 { 0.2 } else { 1.0 };
-        let tilt = self.control.step(0.02, wish, Some(self.motion.velocity()), trust, self.heading, most);
+        let flown = Flown {
+            velocity: Some(self.motion.velocity()),
+            trust,
+            air: Vector::ZERO,
+            tilt: seen,
+            tilt_age_s: 0.0,
+            heading: self.heading,
+            most_tilt_rad: most,
+        };
+        let tilt = self.control.step(0.02, wish, &flown);
         assert!(tilt.magnitude() <= most * 1.0001);
         for _ in 0..20 {
             self.link.push_back(tilt);
