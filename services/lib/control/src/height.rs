@@ -91,12 +91,22 @@ const ROOMY_M: f32 = 0.8;
 /// How fast a level that cannot be (below the floor) or does not matter (thin) is forgotten, m/s.
 const FORGET_M_S: f32 = 0.04;
 
-/// What a beam's range may miss, metres: three times its noise over carpets, where it is four times that of floors.
+/// What a beam's range may miss, metres: at most three times its noise over carpets, where it is four times that of
+/// floors; at least five times the noise over floors.
 const BEAM_GATE_M: f32 = 0.2;
+const BEAM_LEAST_GATE_M: f32 = 0.08;
+/// And between them so many of its mean misses: five standard deviations.
+const BEAM_MISSES: f32 = 4.0;
+/// What misses by more than that and less than a level passes (the rim of a trolley's bed) or stays for so long, seconds:
+/// then the height was wrong.
+const LOW_S: f32 = 0.4;
 /// Mean miss of the beam over a good floor, metres; where it misses by more, it is followed more slowly.
 const BEAM_SURE_M: f32 = 0.02;
-/// Share of the newest miss in the mean: about a second of them.
-const BEAM_SHARE: f32 = 0.05;
+/// Share of the newest miss in the mean: about half a second of them.
+const BEAM_SHARE: f32 = 0.08;
+/// Mean miss over the mean difference of two readings in a row, for normal noise: levels and motion leave no trace in
+/// differences (von Neumann 1941).
+const MISS_OF_DIFFERENCE: f32 = 0.707;
 /// Ranges of a beam that agree on another level: 0.16 s at 25 Hz.
 const BEAM_READINGS: usize = 4;
 
@@ -114,8 +124,9 @@ pub struct HeightEstimator {
     now_ns: u64,
     last_echo_ns: u64,
     doubts: Doubts,
-    /// What the beam's ranges have missed of late, metres: a floor or a carpet.
+    /// What the beam's ranges scatter by of late, metres: a floor or a carpet. And the last of them.
     beam_m: f32,
+    beam_range_m: f32,
 }
 
 impl HeightEstimator {
@@ -135,6 +146,7 @@ impl HeightEstimator {
             last_echo_ns: 0,
             doubts: Doubts::default(),
             beam_m: BEAM_SURE_M,
+            beam_range_m: 0.0,
         }
     }
 
@@ -212,8 +224,8 @@ impl HeightEstimator {
     }
 
     /// Takes a range of a narrow beam along the body's axis, measured at `at_ns` from `rest_m` above the skids with the
-    /// body tilted by `tilt_rad`. It sees what lies under the middle and nothing else: what it does not fit is another
-    /// level, never a motion, which it would have followed.
+    /// body tilted by `tilt_rad`. It sees what lies under the middle and nothing else: what does not fit is another
+    /// level, a motion it would have followed.
     pub fn measure_beam(&mut self, at_ns: u64, range_m: f32, rest_m: f32, tilt_rad: f32) -> Echo {
         let tilt = if tilt_rad.is_finite() { tilt_rad.abs() } else { 0.0 };
         if !(range_m > 0.0 && range_m < 20.0) || tilt > self.config.max_tilt_deg.to_radians() {
@@ -222,9 +234,16 @@ impl HeightEstimator {
         let at_ns = at_ns.min(self.now_ns);
         let error = range_m * tilt.cos() - rest_m - (self.height_at(at_ns) - self.surface_m);
         let gap = seconds(self.last_echo_ns, at_ns);
-        if error.abs() <= BEAM_GATE_M {
+        let differs = (range_m - self.beam_range_m).abs();
+        self.beam_range_m = range_m;
+        if differs < BEAM_GATE_M {
+            self.beam_m += BEAM_SHARE * (MISS_OF_DIFFERENCE * differs - self.beam_m);
+        }
+        let silent = if self.doubts.count > 0 { 0.0 } else { gap };
+        let drifted = self.config.gate_growth_m_s2 * silent.clamp(0.0, 1.0).powi(2);
+        let gate = (BEAM_MISSES * self.beam_m).clamp(BEAM_LEAST_GATE_M, BEAM_GATE_M) + drifted;
+        if error.abs() <= gate {
             self.doubts = Doubts::default();
-            self.beam_m += BEAM_SHARE * (error.abs() - self.beam_m);
             // The noise of the climb rate goes with noise times bandwidth to the power of 3/2.
             let calm = (BEAM_SURE_M / self.beam_m.max(BEAM_SURE_M)).powf(2.0 / 3.0);
             self.correct(at_ns, gap, error, self.config.bandwidth_rad_s * calm);
@@ -237,11 +256,21 @@ impl HeightEstimator {
         if last.len() < BEAM_READINGS || last.iter().any(|error| (error - mean).abs() > BEAM_GATE_M) {
             return Echo::Doubted;
         }
+        let level = self.surface_m - mean;
+        let off_a_low_one = self.surface_m > 0.0 && level.abs() <= gate;
+        if mean.abs() > BEAM_GATE_M || off_a_low_one {
+            self.surface_m = if level.abs() <= BEAM_GATE_M { 0.0 } else { level };
+            self.doubts = Doubts::default();
+            self.last_echo_ns = at_ns;
+            return Echo::Step;
+        }
+        if gap < LOW_S {
+            return Echo::Doubted;
+        }
+        self.lift_all(mean, 0.0);
         self.doubts = Doubts::default();
         self.last_echo_ns = at_ns;
-        let level = self.surface_m - mean;
-        self.surface_m = if level.abs() <= BEAM_GATE_M { 0.0 } else { level };
-        Echo::Step
+        Echo::Jolt
     }
 
     /// Takes an echo that left the ground at `at_ns`, with the body tilted by `tilt_rad` from the vertical.

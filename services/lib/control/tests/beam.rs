@@ -68,6 +68,26 @@ fn tables_and_chairs_flown_over_are_levels_and_no_motion() {
 }
 
 #[test]
+fn the_rim_of_a_trolley_is_no_motion() {
+    // A bed of 0.18 m that is seen for 0.3 s before and after a load of 0.6 m: less than what a carpet's ranges
+    // scatter by, far more than a floor's.
+    let surface = |t: f32| match t % 6.0 {
+        s if (2.0..2.3).contains(&s) || (4.3..4.6).contains(&s) => 0.18,
+        s if (2.3..4.3).contains(&s) => 0.6,
+        _ => 0.0,
+    };
+    let (worst, rms, _) = fly(60.0, FLOOR_M, |_| 1.2, surface);
+    assert!(worst < 0.1 && rms < 0.04, "{worst} {rms}");
+}
+
+#[test]
+fn a_height_that_was_wrong_comes_right() {
+    // 0.15 m too low at the start, no step, no rim.
+    let (worst, rms, steps) = fly(30.0, FLOOR_M, |t| if t < 0.1 { 1.05 } else { 1.2 }, |_| 0.0);
+    assert!(worst < 0.06 && rms < 0.03 && steps == 0, "{worst} {rms} {steps}");
+}
+
+#[test]
 fn it_follows_a_climb_that_the_thrust_model_does_not_know() {
     // Sways by 0.3 m in 3 s: 1.3 m/s2 at most, which the estimator is not told.
     let (worst, rms, steps) = fly(30.0, FLOOR_M, |t| 1.2 + 0.15 * (t * 2.1).sin(), |_| 0.0);
