@@ -18,6 +18,11 @@ message! {
         pub pitch_rad: f32,
         /// Counter-clockwise from compass zero, -pi..pi. **Compass zero is not plan zero.**
         pub yaw_rad: f32,
+        /// What the accelerometer feels along body x (forward), smoothed by the controller, in the frame that its
+        /// attitude is of (m/s2); NaN when the firmware does not tell or its unit is not known.
+        pub force_x_m_s2: f32,
+        /// The same along body y (left).
+        pub force_y_m_s2: f32,
         /// Always zero.
         pub reserved: u32,
     }

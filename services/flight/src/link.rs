@@ -5,7 +5,8 @@ use crate::order::{ReceiverOrder, throttle_of};
 use crate::said::{AttitudeSample, Counts, Identity, Said, question_of, write};
 use crate::schedule::{Question, Schedule};
 use msp::messages::{
-    Analog, ApiVersion, Arming, Attitude, BoxIds, FcVariant, FcVersion, Motor, Rc, RxMap, SetRawRc, Status,
+    Analog, ApiVersion, Arming, Attitude, AttitudeAndImu, BoxIds, FcVariant, FcVersion, Motor, Rc, RxMap,
+    SetRawRc, Status,
 };
 use msp::{Decoder, Direction, EncodeError, Frame, Request, Version, encode_request, parse_reply};
 
@@ -17,8 +18,12 @@ const LOST_NS: u64 = 250_000_000;
 const MOST_OUTSTANDING: usize = 3;
 /// Least time between two commands: nearly one pass of the controller's task.
 const SPACING_NS: u64 = 8_000_000;
-/// From the reading of the attitude to now: an answer of 12 bytes at 115200 baud and half a tick of 5 ms.
+/// From the reading of the attitude to now: an answer of 12 bytes at 115200 baud and half a tick of 5 ms; of 32 bytes
+/// with the accelerometer.
 const ON_THE_WAY_NS: u64 = 3_500_000;
+const ON_THE_WAY_WITH_IMU_NS: u64 = 5_300_000;
+/// So many questions for attitude and accelerometer in one that were never answered: the firmware does not know it.
+const MOST_UNANSWERED: u8 = 3;
 /// Half a frame and then nothing for so long: the rest will not come.
 const QUIET_NS: u64 = 50_000_000;
 /// The receiver's order is waited for this long before it is taken for AETR: two passes of the task and more.
@@ -53,6 +58,11 @@ pub struct Link {
     box_index: [Option<u8>; 4],
     order: Option<ReceiverOrder>,
     identity: Identity,
+    /// Whether the attitude is asked for together with the accelerometer, whether that was ever answered, and how often
+    /// it was not.
+    imu: bool,
+    imu_answered: bool,
+    imu_lost: u8,
     /// What the controller said.
     pub said: Said,
 }
@@ -78,6 +88,9 @@ impl Link {
             box_index: [Some(0), Some(1), None, None],
             order: None,
             identity: Identity::default(),
+            imu: true,
+            imu_answered: false,
+            imu_lost: 0,
             said: Said::default(),
         }
     }
@@ -204,7 +217,13 @@ impl Link {
             Direction::Request => false,
             _ if frame.code == SetRawRc::CODE => self.acknowledged(frame.direction),
             direction => match question_of(frame.code) {
-                Some(question) => self.answer(now, question, direction, frame.payload),
+                Some(question) => {
+                    if frame.code == AttitudeAndImu::CODE {
+                        self.imu &= direction != Direction::Refusal;
+                        self.imu_answered |= self.imu;
+                    }
+                    self.answer(now, question, direction, frame)
+                }
                 None => false,
             },
         };
@@ -223,10 +242,10 @@ impl Link {
         expected
     }
 
-    fn answer(&mut self, now: u64, question: Question, direction: Direction, payload: &[u8]) -> bool {
+    fn answer(&mut self, now: u64, question: Question, direction: Direction, frame: &Frame<'_>) -> bool {
         let Some(sent_ns) = self.asked_ns[question as usize].take() else { return false };
         let understood =
-            direction == Direction::Refusal || self.understand(now, sent_ns, question, payload).is_ok();
+            direction == Direction::Refusal || self.understand(now, sent_ns, question, frame).is_ok();
         if understood && question.once() {
             self.settled[question as usize] = true;
         }
@@ -238,8 +257,9 @@ impl Link {
         now: u64,
         sent_ns: u64,
         question: Question,
-        payload: &[u8],
+        frame: &Frame<'_>,
     ) -> Result<(), msp::TooShort> {
+        let payload = frame.payload;
         match question {
             Question::Status => {
                 self.said.status = Some((now, parse_reply(&Status, payload)?));
@@ -252,9 +272,14 @@ impl Link {
             }
             Question::Rc => self.said.throttle_us = throttle_of(&parse_reply(&Rc, payload)?),
             Question::Attitude => {
-                let reply = parse_reply(&Attitude, payload)?;
-                let sampled_ns = now.saturating_sub(ON_THE_WAY_NS).max(sent_ns);
-                self.said.attitude = Some(AttitudeSample { sampled_ns, reply });
+                let (reply, imu, way_ns) = if frame.code == AttitudeAndImu::CODE {
+                    let both = parse_reply(&AttitudeAndImu, payload)?;
+                    (both.attitude, both.imu, ON_THE_WAY_WITH_IMU_NS)
+                } else {
+                    (parse_reply(&Attitude, payload)?, None, ON_THE_WAY_NS)
+                };
+                let sampled_ns = now.saturating_sub(way_ns).max(sent_ns);
+                self.said.attitude = Some(AttitudeSample { sampled_ns, reply, imu });
             }
             Question::Api => {
                 let reply = parse_reply(&ApiVersion, payload)?;
@@ -313,9 +338,12 @@ impl Link {
         orphan: bool,
         out: &mut [u8; MAX_FRAME],
     ) -> Option<usize> {
-        for slot in &mut self.asked_ns {
+        for (index, slot) in self.asked_ns.iter_mut().enumerate() {
             if slot.is_some_and(|sent| now.saturating_sub(sent) >= LOST_NS) {
                 *slot = None;
+                self.imu_lost += u8::from(index == Question::Attitude as usize && !self.imu_answered);
+                self.imu &= self.imu_lost < MOST_UNANSWERED;
+                self.imu_lost = self.imu_lost.min(MOST_UNANSWERED);
             }
         }
         let since = |at: Option<u64>| at.map_or(u64::MAX, |at| now.saturating_sub(at));
@@ -343,7 +371,7 @@ impl Link {
             let wanted = if question.once() { !settled[index] } else { true };
             wanted && asked[index].is_none() && (!silent || question == Question::Status)
         })?;
-        let length = write(question, self.version, out).ok()?;
+        let length = write(question, self.version, self.imu, out).ok()?;
         self.schedule.asked(question, now, eager);
         self.schedule.spend(now);
         self.asked_ns[question as usize] = Some(now);

@@ -2,8 +2,8 @@
 
 use crate::schedule::Question;
 use msp::messages::{
-    Analog, AnalogReply, ApiVersion, Attitude, AttitudeReply, BoxIds, FcVariant, FcVersion, Motor, Rc, RxMap,
-    Status, StatusReply,
+    Analog, AnalogReply, ApiVersion, Attitude, AttitudeAndImu, AttitudeReply, BoxIds, FcVariant, FcVersion,
+    Motor, RawImuReply, Rc, RxMap, Status, StatusReply,
 };
 use msp::{EncodeError, Request, Version, encode_request};
 
@@ -25,6 +25,8 @@ pub struct AttitudeSample {
     pub sampled_ns: u64,
     /// In the controller's frame.
     pub reply: AttitudeReply,
+    /// The accelerometer, when the firmware gives both at once.
+    pub imu: Option<RawImuReply>,
 }
 
 /// The newest of everything that the controller said. Taken fields are set anew by each answer.
@@ -61,12 +63,18 @@ pub struct Counts {
     pub junk: u32,
 }
 
-/// Writes a question to the front of `out` and returns its length.
-pub(crate) fn write(question: Question, version: Version, out: &mut [u8]) -> Result<usize, EncodeError> {
+/// Writes a question to the front of `out` and returns its length; the attitude with the accelerometer when `imu`.
+pub(crate) fn write(
+    question: Question,
+    version: Version,
+    imu: bool,
+    out: &mut [u8],
+) -> Result<usize, EncodeError> {
     match question {
         Question::Status => encode_request(out, version, &Status),
         Question::Map => encode_request(out, version, &RxMap),
         Question::Rc => encode_request(out, version, &Rc),
+        Question::Attitude if imu => encode_request(out, version, &AttitudeAndImu),
         Question::Attitude => encode_request(out, version, &Attitude),
         Question::Api => encode_request(out, version, &ApiVersion),
         Question::Variant => encode_request(out, version, &FcVariant),
@@ -83,7 +91,7 @@ pub(crate) fn question_of(code: u16) -> Option<Question> {
         Status::CODE => Question::Status,
         RxMap::CODE => Question::Map,
         Rc::CODE => Question::Rc,
-        Attitude::CODE => Question::Attitude,
+        Attitude::CODE | AttitudeAndImu::CODE => Question::Attitude,
         ApiVersion::CODE => Question::Api,
         FcVariant::CODE => Question::Variant,
         FcVersion::CODE => Question::Version,

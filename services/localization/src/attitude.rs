@@ -11,12 +11,23 @@ const EXTRAPOLATE_S: f64 = 0.06;
 /// Points of an interval that its mean is taken over.
 const POINTS: u32 = 5;
 
+/// No accelerometer feels more indoors, m/s²: three g are a crash.
+const MOST_FORCE_M_S2: f32 = 30.0;
+
 /// One attitude.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Tilt {
     pub(crate) roll: f32,
     pub(crate) pitch: f32,
     pub(crate) yaw: f32,
+    /// Specific force along body x and y, m/s²; NaN when it is not known.
+    pub(crate) force: [f32; 2],
+}
+
+impl Default for Tilt {
+    fn default() -> Self {
+        Self { roll: 0.0, pitch: 0.0, yaw: 0.0, force: [f32::NAN; 2] }
+    }
 }
 
 /// A ring of attitudes in the order of their times.
@@ -49,12 +60,18 @@ impl Default for Attitudes {
 impl Attitudes {
     /// Appends a sample; false when it makes no sense or is older than the newest one.
     pub fn push(&mut self, time_ns: u64, roll: f32, pitch: f32, yaw: f32) -> bool {
+        self.push_felt(time_ns, roll, pitch, yaw, [f32::NAN; 2])
+    }
+
+    /// The same with the specific force along body x and y, m/s²; NaN when it is not known.
+    pub fn push_felt(&mut self, time_ns: u64, roll: f32, pitch: f32, yaw: f32, force: [f32; 2]) -> bool {
         // Half a turn bounds any roll; the yaw may have been counted on for many turns, not for ever.
         let sane = roll.abs() <= 3.2 && pitch.abs() <= 3.2 && yaw.abs() < 1e3;
         if !sane || time_ns == 0 || self.newest().is_some_and(|n| time_ns <= n.0) {
             return false;
         }
-        self.ring[self.next] = (time_ns, Tilt { roll, pitch, yaw: wrap_angle(yaw) });
+        let force = force.map(|axis| if axis.abs() < MOST_FORCE_M_S2 { axis } else { f32::NAN });
+        self.ring[self.next] = (time_ns, Tilt { roll, pitch, yaw: wrap_angle(yaw), force });
         self.next = (self.next + 1) % KEPT;
         self.filled = (self.filled + 1).min(KEPT);
         true
@@ -110,6 +127,7 @@ impl Attitudes {
                     roll: between(before.1.roll, after.1.roll),
                     pitch: between(before.1.pitch, after.1.pitch),
                     yaw: wrap_angle(before.1.yaw + part * wrap_angle(after.1.yaw - before.1.yaw)),
+                    force: [0, 1].map(|axis| between(before.1.force[axis], after.1.force[axis])),
                 });
             }
             after = before;

@@ -191,8 +191,14 @@ impl Localization {
     fn listen(&mut self, now: u64) {
         while let Some(a) = self.attitude.receive() {
             // Times ahead of ours would stop the history until they are reached.
-            let taken =
-                a.sampled_ns <= now && self.attitudes.push(a.sampled_ns, a.roll_rad, a.pitch_rad, a.yaw_rad);
+            let taken = a.sampled_ns <= now
+                && self.attitudes.push_felt(
+                    a.sampled_ns,
+                    a.roll_rad,
+                    a.pitch_rad,
+                    a.yaw_rad,
+                    [a.force_x_m_s2, a.force_y_m_s2],
+                );
             self.refused += u64::from(!taken);
         }
         while let Some(state) = self.pilot.receive() {

@@ -1,13 +1,15 @@
 //! The velocity that is flown by.
 //!
 //! The particle set averages over many pings: its velocity follows a gust late, and a loop that flies by it sways.
-//! This filter carries place, velocity and what the air does (a first-order gust, the Dryden shape) from one
-//! measurement to the next by the measured tilt. Optical flow, when there is any, measures the velocity within a
+//! This filter carries place, velocity and what is not felt (a first-order gust, the Dryden shape) from one
+//! measurement to the next by the measured tilt and what the accelerometer feels: beside the thrust, which is along
+//! the body's own axis, that is the air (Leishman et al. 2014), and a gust is known before it has moved the body. A
+//! controller that does not tell leaves the gust to be learned from the motion. Optical flow, when there is any, measures the velocity within a
 //! frame; over a floor that shows little it still shows a share of the motion, which is learned along with it. The
 //! change of a range between two pings measures the velocity towards what was heard. The particles' place, which the
 //! walls hold fast, keeps the sum right.
 
-use crate::attitude::{Attitudes, seconds};
+use crate::attitude::{Attitudes, Tilt, seconds};
 use crate::flow::Frame;
 use crate::rate::{LONGEST_S, Ping};
 use ipc_types::MAX_SONARS;
@@ -25,6 +27,11 @@ const JUMP_M: f32 = 0.6;
 /// near walls; the rest and the longer time make room for an error of level.
 const GUST_M_S2: f32 = 0.3;
 const GUST_S: f32 = 1.0;
+/// The same where the accelerometer feels the gust: what is left are errors of the attitude, a third of a degree.
+const UNFELT_M_S2: f32 = 0.12;
+const UNFELT_S: f32 = 2.0;
+/// Random walk of the velocity where the accelerometer feels the gust: its vibration, 30 readings a second.
+const FELT_WALK: f32 = 0.04;
 /// Random walk of the velocity beside the gust, m/s per √s: tilt is read to a tenth of a degree, 30 times a second.
 const WALK: f32 = 0.1;
 /// How fast the weight of a surprising measurement falls, like Student's t: flow errs when the body turns fast.
@@ -219,12 +226,26 @@ impl Velocity {
         then.advance(time_ns, attitudes, frames);
         let velocity = [then.state[0][1], then.state[1][1]];
         let variance = then.variance[0][1][1].max(then.variance[2][1][1]).max(0.0);
-        let air = [then.state[0][2], then.state[1][2]];
+        let air = then.air(time_ns, attitudes, frames);
         velocity.iter().chain(&air).all(|v| v.is_finite()).then(|| Swept {
             velocity,
             sigma: variance.sqrt(),
             air,
         })
+    }
+
+    /// What accelerates the body beside its tilt and its drag, plan frame, m/s².
+    fn air(&self, time_ns: u64, attitudes: &Attitudes, frames: &Frames) -> [f32; 2] {
+        let tilt = attitudes.at(time_ns).unwrap_or_default();
+        let unfelt = [self.state[0][2], self.state[1][2]];
+        if !tilt.force.iter().all(|axis| axis.is_finite()) {
+            return unfelt;
+        }
+        let (sin, cos) = (tilt.yaw + frames.heading_offset).sin_cos();
+        let (read, upright) = (tilted(&tilt, [0.0; 2]), tilted(&tilt, frames.level));
+        let [forward, left] = [0, 1].map(|axis| read[axis] - upright[axis] + tilt.force[axis]);
+        let felt = [cos * forward - sin * left, sin * forward + cos * left];
+        [0, 1].map(|axis| felt[axis] + unfelt[axis] + frames.drag * self.state[axis][1])
     }
 
     pub(crate) fn advance(&mut self, to_ns: u64, attitudes: &Attitudes, frames: &Frames) {
@@ -235,11 +256,22 @@ impl Velocity {
             let time = self.time_ns + ((f64::from(step) + 0.5) * h * 1e9) as u64;
             let tilt = attitudes.at(time).unwrap_or_default();
             let (sin, cos) = (tilt.yaw + frames.heading_offset).sin_cos();
-            let forward = GRAVITY * (tilt.pitch - frames.level[1]).clamp(-0.6, 0.6).tan();
-            let left = -GRAVITY * (tilt.roll - frames.level[0]).clamp(-0.6, 0.6).tan();
+            let felt = tilt.force.iter().all(|axis| axis.is_finite());
+            // In the frame that attitude and accelerometer share an error of level has no part.
+            let [forward, left] = if felt {
+                let [forward, left] = tilted(&tilt, [0.0; 2]);
+                [forward + tilt.force[0], left + tilt.force[1]]
+            } else {
+                tilted(&tilt, frames.level)
+            };
             let tilted = [cos * forward - sin * left, sin * forward + cos * left];
             let h = h as f32;
-            let (keep, slow) = (1.0 - h / GUST_S, 1.0 - frames.drag * h);
+            let (gust_m_s2, gust_s, walk, drag) = if felt {
+                (UNFELT_M_S2, UNFELT_S, FELT_WALK, 0.0)
+            } else {
+                (GUST_M_S2, GUST_S, WALK, frames.drag)
+            };
+            let (keep, slow) = (1.0 - h / gust_s, 1.0 - drag * h);
             for (([place, velocity, gust], way), tilted) in
                 self.state.iter_mut().zip(&mut self.way).zip(tilted)
             {
@@ -256,13 +288,19 @@ impl Velocity {
             for (block, own) in self.variance.iter_mut().zip([true, false, true]) {
                 *block = carried(&forward, block);
                 if own {
-                    block[1][1] += WALK * WALK * h;
-                    block[2][2] += 2.0 * GUST_M_S2 * GUST_M_S2 / GUST_S * h;
+                    block[1][1] += walk * walk * h;
+                    block[2][2] += 2.0 * gust_m_s2 * gust_m_s2 / gust_s * h;
                 }
             }
         }
         self.time_ns = to_ns.max(self.time_ns);
     }
+}
+
+/// Acceleration forward and left by a tilt that is read, of a body that is upright at `level` (roll, pitch), m/s².
+fn tilted(tilt: &Tilt, level: [f32; 2]) -> [f32; 2] {
+    let of = |angle: f32| GRAVITY * angle.clamp(-0.6, 0.6).tan();
+    [of(tilt.pitch - level[1]), -of(tilt.roll - level[0])]
 }
 
 /// The velocity of a frame, which is in the body's, in the plan's.

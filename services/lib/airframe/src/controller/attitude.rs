@@ -76,6 +76,11 @@ impl AttitudeFilter {
         self.body_to_earth = UnitQuaternion::new_normalize(self.body_to_earth.quaternion() * turn);
     }
 
+    /// The accelerometer behind its low-pass, body frame, m/s².
+    pub(crate) fn accelerometer(&self) -> [f64; 3] {
+        self.accelerometer.into()
+    }
+
     /// The vertical in the body frame.
     pub(crate) fn up(&self) -> Vector3<f64> {
         let q = self.body_to_earth.as_ref();

@@ -2,6 +2,7 @@
 
 use super::personality::{FailsafeSettings, Personality, Procedure};
 use super::receiver::{CHANNELS, PITCH, ROLL, Receiver, THROTTLE, YAW};
+use crate::vehicle::GRAVITY_M_S2;
 
 const API_VERSION: u16 = 1;
 const FC_VARIANT: u16 = 2;
@@ -13,6 +14,7 @@ const RX_MAP: u16 = 64;
 const FAILSAFE_CONFIG: u16 = 75;
 const RXFAIL_CONFIG: u16 = 77;
 const STATUS: u16 = 101;
+const RAW_IMU: u16 = 102;
 const MOTOR: u16 = 104;
 const RC: u16 = 105;
 const ATTITUDE: u16 = 108;
@@ -21,6 +23,7 @@ const ANALOG: u16 = 110;
 const BOX_NAMES: u16 = 116;
 const BOX_IDS: u16 = 119;
 const STATUS_EX: u16 = 150;
+pub(super) const MULTIPLE_MSP: u16 = 230;
 pub(super) const SET_RAW_RC: u16 = 200;
 pub(super) const SET_MOTOR: u16 = 214;
 
@@ -46,6 +49,8 @@ pub(super) struct View<'a> {
     pub(super) roll_rad: f64,
     pub(super) pitch_rad: f64,
     pub(super) heading_rad: f64,
+    /// Accelerometer behind its low-pass, body frame, m/s².
+    pub(super) accelerometer: [f64; 3],
     pub(super) volts: f64,
     pub(super) amps: f64,
     pub(super) drawn_mah: f64,
@@ -87,6 +92,31 @@ impl Payload {
     }
 }
 
+/// One g in the units of MSP_RAW_IMU: 2048 of an accelerometer of 16 g, divided by 4.
+const ONE_G: f64 = 512.0;
+
+/// Several answers in one, each behind its length; what is not known is empty. `false` for none.
+pub(super) fn multiple(codes: &[u8], view: &View<'_>, out: &mut Payload) -> bool {
+    for code in codes.iter().filter(|code| u16::from(**code) != MULTIPLE_MSP) {
+        let mut part = Payload::new();
+        answer((*code).into(), view, &mut part);
+        if out.length + 1 + part.length > out.bytes.len() {
+            break;
+        }
+        out.u8(part.length as u8);
+        out.put(part.bytes());
+    }
+    !codes.is_empty()
+}
+
+/// Accelerometer, gyroscope (whole degrees a second: nobody here asks for it) and compass, nine words.
+fn raw_imu(view: &View<'_>, out: &mut Payload) {
+    for axis in view.accelerometer {
+        out.i16((axis / GRAVITY_M_S2 * ONE_G).round());
+    }
+    out.pad_to(18);
+}
+
 /// Writes the answer; `false` for a message that this firmware does not know.
 pub(super) fn answer(code: u16, view: &View<'_>, out: &mut Payload) -> bool {
     let p = view.personality;
@@ -107,6 +137,7 @@ pub(super) fn answer(code: u16, view: &View<'_>, out: &mut Payload) -> bool {
         FAILSAFE_CONFIG => failsafe_config(view.failsafe, out),
         RXFAIL_CONFIG => rxfail_config(view.failsafe, out),
         STATUS | STATUS_EX => status(code == STATUS_EX, view, out),
+        RAW_IMU => raw_imu(view, out),
         MOTOR => view.motors_us.iter().for_each(|motor| out.u16(*motor)),
         RC => rc(view.receiver, out),
         ATTITUDE => attitude(view, out),

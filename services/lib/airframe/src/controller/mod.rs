@@ -191,11 +191,20 @@ impl Controller {
                     roll_rad,
                     pitch_rad,
                     heading_rad: self.attitude.heading(),
+                    accelerometer: self.attitude.accelerometer(),
                     volts: self.senses.volts,
                     amps: self.senses.amps,
                     drawn_mah: self.senses.drawn_mah,
                 };
-                messages::answer(code, &view, &mut payload)
+                if code == messages::MULTIPLE_MSP {
+                    messages::multiple(
+                        self.decoder.payload().get(..length).unwrap_or_default(),
+                        &view,
+                        &mut payload,
+                    )
+                } else {
+                    messages::answer(code, &view, &mut payload)
+                }
             }
         };
         let direction = if known { b'>' } else { b'!' };

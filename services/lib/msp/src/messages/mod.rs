@@ -14,6 +14,6 @@ pub use identity::{
 pub use sensor::{FlowFrame, RangeFrame};
 pub use status::{Arming, Status, StatusEx, StatusReply};
 pub use telemetry::{
-    Altitude, AltitudeReply, Analog, AnalogReply, Attitude, AttitudeReply, FailsafeConfig,
-    FailsafeConfigReply, Motor, MotorReply, Rc, RcReply,
+    Altitude, AltitudeReply, Analog, AnalogReply, Attitude, AttitudeAndImu, AttitudeAndImuReply,
+    AttitudeReply, FailsafeConfig, FailsafeConfigReply, Motor, MotorReply, RawImu, RawImuReply, Rc, RcReply,
 };

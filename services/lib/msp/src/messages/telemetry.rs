@@ -1,5 +1,6 @@
 //! What the controller measures and does.
 
+use crate::encode::Writer;
 use crate::reader::{Reader, TooShort};
 use crate::request::{Layout, Request};
 
@@ -27,6 +28,56 @@ impl Layout<'_> for AttitudeReply {
             pitch_decidegrees: reader.i16()?,
             yaw_degrees: reader.i16()?,
         })
+    }
+}
+
+/// MSP_RAW_IMU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RawImu;
+/// Answer to [`RawImu`]: the accelerometer; gyroscope and compass, which follow, are not read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RawImuReply {
+    /// Specific force along x forward, y left, z up, smoothed by the firmware. One g is about 512 of these (MultiWii's
+    /// unit; by the accelerometer's own scale it may be 256): what it reads at rest tells.
+    pub accelerometer: [i16; 3],
+}
+impl Request for RawImu {
+    const CODE: u16 = 102;
+    type Reply<'a> = RawImuReply;
+}
+impl Layout<'_> for RawImuReply {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, TooShort> {
+        Ok(Self { accelerometer: [reader.i16()?, reader.i16()?, reader.i16()?] })
+    }
+}
+
+/// [`Attitude`] and [`RawImu`] in one request: MSP_MULTIPLE_MSP (Betaflight: `src/main/msp/msp.c`; the answers one
+/// after the other, each behind its length). A firmware without it refuses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AttitudeAndImu;
+/// Answer to [`AttitudeAndImu`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AttitudeAndImuReply {
+    /// The attitude.
+    pub attitude: AttitudeReply,
+    /// The accelerometer, read in the same pass; absent on a board without one.
+    pub imu: Option<RawImuReply>,
+}
+impl Request for AttitudeAndImu {
+    const CODE: u16 = 230;
+    type Reply<'a> = AttitudeAndImuReply;
+    fn write(&self, payload: &mut Writer<'_>) {
+        payload.u8(Attitude::CODE as u8);
+        payload.u8(RawImu::CODE as u8);
+    }
+}
+impl Layout<'_> for AttitudeAndImuReply {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, TooShort> {
+        let length = reader.u8()?.into();
+        let attitude = AttitudeReply::read(&mut Reader::new(reader.bytes(length)?))?;
+        let imu = reader.u8().and_then(|length| reader.bytes(length.into()));
+        let imu = imu.and_then(|bytes| RawImuReply::read(&mut Reader::new(bytes)));
+        Ok(Self { attitude, imu: imu.ok() })
     }
 }
 
