@@ -23,8 +23,8 @@ message! {
         pub force_x_m_s2: f32,
         /// The same along body y (left).
         pub force_y_m_s2: f32,
-        /// Always zero.
-        pub reserved: u32,
+        /// The same along body z (up): one g at rest.
+        pub force_z_m_s2: f32,
     }
 }
 

@@ -48,13 +48,13 @@ pub struct Core {
 /// m/s2.
 const GRAVITY_M_S2: f32 = 9.806_65;
 
-/// MSP_RAW_IMU to m/s2 along body x and y. One g reads 512, or 256 on boards with a coarse accelerometer; what is near
+/// MSP_RAW_IMU to m/s2 along body x, y and z. One g reads 512, or 256 on boards with a coarse accelerometer; what is near
 /// neither (a fall, a fault) is not told.
-fn felt(accelerometer: [i16; 3]) -> Option<[f32; 2]> {
+fn felt(accelerometer: [i16; 3]) -> Option<[f32; 3]> {
     let [x, y, z] = accelerometer.map(f32::from);
     let all = (x * x + y * y + z * z).sqrt();
     let one_g = [512.0, 256.0].into_iter().find(|one_g| (0.75..1.33).contains(&(all / one_g)))?;
-    Some([x, y].map(|axis| axis / one_g * GRAVITY_M_S2))
+    Some([x, y, z].map(|axis| axis / one_g * GRAVITY_M_S2))
 }
 
 impl Core {
@@ -218,7 +218,7 @@ impl Core {
         // Clockwise 0..360 becomes counter-clockwise -180..180.
         let clockwise = f32::from(sample.reply.yaw_degrees).rem_euclid(360.0);
         let yaw = if clockwise > 180.0 { 360.0 - clockwise } else { -clockwise };
-        let force = sample.imu.and_then(|imu| felt(imu.accelerometer)).unwrap_or([f32::NAN; 2]);
+        let force = sample.imu.and_then(|imu| felt(imu.accelerometer)).unwrap_or([f32::NAN; 3]);
         self.tilt_cos = (roll.to_radians().cos() * pitch.to_radians().cos()).max(0.0);
         Some(Attitude {
             sampled_ns: sample.sampled_ns,
@@ -227,6 +227,7 @@ impl Core {
             yaw_rad: yaw.to_radians(),
             force_x_m_s2: force[0],
             force_y_m_s2: force[1],
+            force_z_m_s2: force[2],
             ..Attitude::default()
         })
     }

@@ -60,6 +60,9 @@ impl PilotCore {
             let acceleration = tilt.acceleration(self.heading()) + self.velocity.learned() + self.air(now);
             self.motion.predict(now, acceleration.limited(4.0));
             let vertical = self.climb.expected_acceleration(dt, tilt.magnitude(), self.height.climb_m_s());
+            if let Some(lifted) = self.attitude.lifted.take() {
+                self.height.feel(now, lifted - vertical);
+            }
             self.height.predict(now, vertical);
         } else {
             self.motion.predict(now, Vector::ZERO);

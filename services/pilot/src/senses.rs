@@ -1,6 +1,6 @@
 //! What has been heard last, checked.
 
-use control::{Tilt, Vector, wrap_angle};
+use control::{GRAVITY_M_S2, Tilt, Vector, wrap_angle};
 use ipc_types::{
     Attitude, FlightState, LinkState, LocalizationState, Pose, Power, Setpoint, SetpointKind, Text,
     seconds_between,
@@ -19,7 +19,12 @@ pub(crate) struct AttitudeSeen {
     pub(crate) sampled: Option<u64>,
     pub(crate) tilt: Tilt,
     pub(crate) yaw: f32,
+    /// Vertical acceleration by the accelerometer, up positive, until it is taken; m/s2.
+    pub(crate) lifted: Option<f32>,
 }
+
+/// More is a crash, no flight, m/s2.
+const MOST_LIFT_M_S2: f32 = 20.0;
 
 impl AttitudeSeen {
     pub(crate) fn take(&mut self, message: &Attitude) -> bool {
@@ -30,10 +35,22 @@ impl AttitudeSeen {
                 sampled: Some(message.sampled_ns),
                 tilt: Tilt { roll: message.roll_rad, pitch: message.pitch_rad },
                 yaw: message.yaw_rad,
+                lifted: lifted(message),
             };
         }
         sane
     }
+}
+
+/// What the accelerometer feels along the vertical, less gravity; `None` when it is not told.
+fn lifted(message: &Attitude) -> Option<f32> {
+    let (roll_sin, roll_cos) = message.roll_rad.sin_cos();
+    let (pitch_sin, pitch_cos) = message.pitch_rad.sin_cos();
+    // The vertical in the body frame: right side down lifts the left, nose down lowers the front.
+    let up = -message.force_x_m_s2 * pitch_sin
+        + message.force_y_m_s2 * roll_sin * pitch_cos
+        + message.force_z_m_s2 * roll_cos * pitch_cos;
+    Some(up - GRAVITY_M_S2).filter(|lifted| lifted.abs() < MOST_LIFT_M_S2)
 }
 
 /// The newest pose.

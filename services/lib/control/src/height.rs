@@ -75,6 +75,8 @@ pub enum Echo {
 const MEMORY: usize = 32;
 /// Unexplained acceleration that is believed, m/s2: a third of the weight.
 const MAX_BIAS_M_S2: f32 = 3.5;
+/// What the accelerometer feels is believed in this time, seconds: its low-pass and the link are 0.03 s behind the model.
+const FELT_S: f32 = 0.1;
 /// Silence from which the gate widens, seconds: after a shorter one, what does not fit is rather a step than a drift.
 const SILENCE_S: f32 = 0.4;
 /// Readings on one line scatter about it by less than this, metres: over carpets echoes come 2 to 10 cm late.
@@ -124,6 +126,8 @@ pub struct HeightEstimator {
     now_ns: u64,
     last_echo_ns: u64,
     doubts: Doubts,
+    /// When the accelerometer was heard last.
+    felt_ns: u64,
     /// What the beam's ranges scatter by of late, metres: a floor or a carpet. And the last of them.
     beam_m: f32,
     beam_range_m: f32,
@@ -145,6 +149,7 @@ impl HeightEstimator {
             now_ns: 0,
             last_echo_ns: 0,
             doubts: Doubts::default(),
+            felt_ns: 0,
             beam_m: BEAM_SURE_M,
             beam_range_m: 0.0,
         }
@@ -197,6 +202,17 @@ impl HeightEstimator {
         }
         self.newest = (self.newest + 1) % MEMORY;
         self.memory[self.newest] = (now, self.height_m);
+    }
+
+    /// The accelerometer feels this much more than the thrust model expects, m/s2: a gust, a sagging battery or a motor
+    /// that lags, before they have moved the body.
+    pub fn feel(&mut self, now: u64, more_m_s2: f32) {
+        let dt = seconds(self.felt_ns, now).clamp(0.0, FELT_S);
+        self.felt_ns = now;
+        if more_m_s2.is_finite() {
+            let more = more_m_s2.clamp(-MAX_BIAS_M_S2, MAX_BIAS_M_S2);
+            self.bias_m_s2 += dt / FELT_S * (more - self.bias_m_s2);
+        }
     }
 
     /// Moves height and surface alike: the distance between them, which is measured, stays.
