@@ -47,6 +47,8 @@ pub struct Mean {
     pub pitch: f32,
     /// Compass frame, radians.
     pub yaw: f32,
+    /// Specific force along body x and y, m/s²; NaN when some of it is not known.
+    pub force: [f32; 2],
     /// How much of the interval no sample stands for, seconds.
     pub blind_s: f32,
 }
@@ -150,9 +152,11 @@ impl Attitudes {
             if self.known(time) {
                 mean.roll += tilt.roll * share;
                 mean.pitch += tilt.pitch * share;
+                mean.force = [0, 1].map(|axis| mean.force[axis] + tilt.force[axis] * share);
             } else {
                 // Level, on average: that is how indoor drones fly.
                 blind += 1;
+                mean.force = [f32::NAN; 2];
             }
             yaw += wrap_angle(tilt.yaw - first.yaw) * share;
         }

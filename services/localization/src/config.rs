@@ -38,6 +38,8 @@ section! {
     MotionSection mirrors MotionConfig {
         /// m/s per √s.
         velocity_noise: f32,
+        /// The same where the accelerometer feels the gusts, m/s per root second.
+        felt_noise: f32,
         /// m per √s.
         position_noise: f32,
         /// σ of the factor on the distance flown.

@@ -21,6 +21,8 @@ use std::sync::Arc;
 /// Attitudes averaged before the first set is drawn: a quarter of a second at 30 Hz, enough for the whole
 /// degrees in which a controller gives its yaw.
 const RESTING_SAMPLES: usize = 8;
+/// m/s².
+const GRAVITY_M_S2: f32 = 9.806_65;
 /// Tilt on the ground beyond which it is the ground that slopes, radians; the level error of a calibrated
 /// controller is smaller.
 const LARGEST_LEVEL: f32 = 0.05;
@@ -67,6 +69,9 @@ pub struct Localization {
     sent_ns: u64,
     grounded: bool,
     believed: Option<Believed>,
+    /// What the attitude reads (roll, pitch) when the body is level, as it stood on the ground; after a restart in the air
+    /// as it is believed then. It stays: a level that follows the filter would lead it.
+    level: Option<[f32; 2]>,
     next_pose_ns: u64,
     refused: u64,
 }
@@ -121,6 +126,7 @@ impl Service for Localization {
             sent_ns: 0,
             grounded: true,
             believed: None,
+            level: None,
             next_pose_ns: 0,
             refused: 0,
         };
@@ -304,6 +310,7 @@ impl Localization {
             level_sigma: start.level_sigma_deg.to_radians(),
             p_lost: if self.grounded { 0.01 } else { HOPELESS },
         };
+        self.level = self.grounded.then_some([start.level_roll, start.level_pitch]);
         let mut generator = Generator::new(self.seed);
         let update = self.filter.start_at(&start, columns_mut(&mut loan), &mut generator);
         loan.estimated_ns = now;
@@ -325,7 +332,15 @@ impl Localization {
         let memory = Memory::from_array(&set.memory);
         let level = self.believed.map_or([0.0; 2], |b| [b.estimate.level_roll, b.estimate.level_pitch]);
         let mean = self.attitudes.mean(set.estimated_ns, time_ns);
+        // What the accelerometer reads of gravity, because it sits aslant, is no motion: as it stood on the ground.
+        if self.believed.is_some() {
+            self.level.get_or_insert(level);
+        }
+        let felt = self.level.map(|level| {
+            [mean.force[0] + GRAVITY_M_S2 * level[1].tan(), mean.force[1] - GRAVITY_M_S2 * level[0].tan()]
+        });
         let motion = Motion {
+            felt,
             dt_s: seconds(set.estimated_ns, time_ns) as f32,
             blind_s: mean.blind_s,
             roll_rad: mean.roll,

@@ -18,6 +18,8 @@ pub struct MotionConfig {
     /// Random walk of the velocity, m/s per √s: gusts and the tilt that the controller misjudges.
     /// FACTS 8: 0.3 to 0.45; 0.15 lost half of the flights.
     pub velocity_noise: f32,
+    /// The same where an accelerometer feels the gusts: a tilt that errs by 0.4 degrees for two seconds at a time.
+    pub felt_noise: f32,
     /// Roughening of the position, m per √s. FACTS 8: about 1 cm a ping of 60 ms.
     pub position_noise: f32,
     /// σ of equation 2's factor 1 + N(0, σ²) on the distance flown.
@@ -40,6 +42,7 @@ impl Default for MotionConfig {
     fn default() -> Self {
         Self {
             velocity_noise: 0.35,
+            felt_noise: 0.17,
             position_noise: 0.05,
             distance_noise: 0.05,
             heading_noise: 0.02,
@@ -55,6 +58,7 @@ impl Default for MotionConfig {
 impl MotionConfig {
     pub(crate) fn check(&self) -> Result<(), ConfigError> {
         within("motion.velocity_noise", self.velocity_noise, 0.01..=3.0)?;
+        within("motion.felt_noise", self.felt_noise, 0.01..=3.0)?;
         within("motion.position_noise", self.position_noise, 0.001..=1.0)?;
         within("motion.distance_noise", self.distance_noise, 0.0..=1.0)?;
         within("motion.heading_noise", self.heading_noise, 0.0..=1.0)?;
@@ -90,6 +94,9 @@ pub struct Motion {
     pub pitch_rad: f32,
     /// Mean over the interval, compass frame, counter-clockwise.
     pub yaw_rad: f32,
+    /// Mean specific force of the air over the interval, body frame forward and left, m/s²: what an accelerometer feels
+    /// beside the thrust. Drag is part of it.
+    pub felt: Option<[f32; 2]>,
     /// Velocity, when there is a flow sensor and it saw something.
     pub flow: Option<Flow>,
     /// On the ground: nothing moves.
@@ -113,6 +120,7 @@ pub(crate) struct Step {
     yaw: f32,
     keep: f32,
     push: f32,
+    felt: [f32; 2],
     flow: [f32; 2],
     flow_gain: f32,
     flow_precision: f32,
@@ -132,11 +140,14 @@ impl Step {
         let finite = |v: f32| if v.is_finite() { v } else { 0.0 };
         let dt = finite(motion.dt_s).clamp(0.0, LONGEST_S);
         let blind = finite(motion.blind_s).clamp(0.0, dt);
-        let keep = exp_minus(config.drag * dt);
+        let felt = motion.felt.filter(|felt| felt.iter().all(|axis| axis.is_finite()));
+        let (drag, wander) =
+            if felt.is_some() { (0.0, config.felt_noise) } else { (config.drag, config.velocity_noise) };
+        let keep = exp_minus(drag * dt);
         // ∫ of the decaying response; its limit without drag is dt.
-        let push = if config.drag > 1e-3 { (1.0 - keep) / config.drag } else { dt };
+        let push = if drag > 1e-3 { (1.0 - keep) / drag } else { dt };
         let spread = config.blind_acceleration * blind;
-        let velocity_variance = config.velocity_noise * config.velocity_noise * dt + spread * spread;
+        let velocity_variance = wander * wander * dt + spread * spread;
         let flow = motion.flow.filter(|f| {
             f.velocity_x.is_finite() && f.velocity_y.is_finite() && f.sigma.is_finite() && f.sigma > 0.0
         });
@@ -158,6 +169,7 @@ impl Step {
             yaw: finite(motion.yaw_rad),
             keep,
             push,
+            felt: felt.unwrap_or_default(),
             flow,
             flow_gain,
             flow_precision,
@@ -200,8 +212,8 @@ impl Step {
             let (sin, cos) = sin_cos(self.yaw + offset);
 
             // Nose down drives forward (+x), right side down drives right (-y).
-            let forward = GRAVITY * tan_tilt(self.pitch - level_pitch);
-            let left = -GRAVITY * tan_tilt(self.roll - level_roll);
+            let forward = GRAVITY * tan_tilt(self.pitch - level_pitch) + self.felt[0];
+            let left = -GRAVITY * tan_tilt(self.roll - level_roll) + self.felt[1];
             let foretold_x = vx[i] * self.keep + (cos * forward - sin * left) * self.push;
             let foretold_y = vy[i] * self.keep + (sin * forward + cos * left) * self.push;
 

@@ -348,6 +348,7 @@ pub(crate) fn fly(world: &World, trial: &Trial) -> Log {
         group = (group + 1) % 4;
         let sweep = Sweep { readings: &readings, roll_rad: roll, pitch_rad: pitch, yaw_rad: yaw };
         let motion = Motion {
+            felt: None,
             dt_s: DT,
             blind_s: 0.0,
             roll_rad: roll,
