@@ -212,6 +212,7 @@ impl Link {
         if self.silent(now) {
             // Whoever answers after a silence may have restarted, or be another one.
             self.settled = [false; 10];
+            (self.imu, self.imu_answered, self.imu_lost) = (true, false, 0);
         }
         let answered = match frame.direction {
             Direction::Request => false,

@@ -24,7 +24,8 @@ fn fifty_frames_and_at_most_ninety_commands_in_any_second() {
         assert!((49..=51).contains(&frames), "{frames}");
     }
     let per_second = |code| in_window(&world, world.now - 5_000 * MS, world.now, Some(code)) as f64 / 5.0;
-    assert!(per_second(108) >= 28.5, "attitude {}", per_second(108));
+    assert!(per_second(230) >= 28.5, "attitude and accelerometer {}", per_second(230));
+    assert!(per_second(108) < 0.1, "the attitude alone {}", per_second(108));
     assert!((4.5..=5.5).contains(&per_second(101)), "status {}", per_second(101));
     assert!((1.5..=2.5).contains(&per_second(110)), "analog {}", per_second(110));
     // Nothing is asked twice that does not change.
@@ -67,6 +68,48 @@ fn an_order_that_makes_no_sense_is_said_and_never_armed_with() {
     world.run(4_000);
     assert!(!world.controller.armed);
     assert!(world.reason().contains("channel order"), "{}", world.reason());
+}
+
+#[test]
+fn the_accelerometer_comes_with_the_attitude_in_either_unit() {
+    // 0.5 m/s2 forward, 1 to the right, one g up: in 512ths and in 256ths of g; half of it is a fall.
+    let g = 9.806_65;
+    for (read, felt) in [
+        ([26, -52, 512], Some([26.0 / 512.0 * g, -52.0 / 512.0 * g, g])),
+        ([13, -26, 256], Some([13.0 / 256.0 * g, -26.0 / 256.0 * g, g])),
+        ([0, 0, 100], None),
+        ([0, 0, 0], None),
+        ([i16::MIN, i16::MAX, i16::MIN], None),
+    ] {
+        let mut controller = Controller::new();
+        controller.accelerometer = Some(read);
+        let mut world = World::new(controller);
+        world.run(500);
+        let attitude = world.attitudes.last().unwrap();
+        let force = [attitude.force_x_m_s2, attitude.force_y_m_s2, attitude.force_z_m_s2];
+        match felt {
+            Some(felt) => assert!(force.iter().zip(felt).all(|(a, b)| (a - b).abs() < 1e-3), "{force:?}"),
+            None => assert!(force.iter().all(|axis| axis.is_nan()), "{read:?}: {force:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_firmware_that_answers_one_question_at_a_time_is_asked_for_the_attitude_alone() {
+    // One that refuses, and one that knows no refusals.
+    for sullen in [false, true] {
+        let mut controller = Controller::new();
+        (controller.accelerometer, controller.sullen) = (None, sullen);
+        controller.attitude = [125, -30, 350];
+        let mut world = World::new(controller);
+        world.run(5_000);
+        let from = world.now - 2_000 * MS;
+        let alone = in_window(&world, from, world.now, Some(108));
+        assert!(alone >= 30, "sullen {sullen}: {alone}");
+        assert_eq!(in_window(&world, from, world.now, Some(230)), 0, "sullen {sullen}");
+        let attitude = world.attitudes.last().unwrap();
+        assert!((attitude.roll_rad.to_degrees() - 12.5).abs() < 1e-3 && attitude.force_x_m_s2.is_nan());
+    }
 }
 
 #[test]

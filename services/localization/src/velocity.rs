@@ -405,6 +405,33 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_gust_that_is_felt_is_known_without_flow_and_an_error_of_level_is_none() {
+        // A draught of 0.5 m/s2 for 0.8 s, nothing else measured but the particles' place, which has not moved yet. The
+        // controller sits 1.5 degrees aslant, which nobody knows: its accelerometer does as well.
+        let frames = Frames::default();
+        let mut attitudes = Attitudes::default();
+        for i in 1..60u64 {
+            let gust = if i > 6 { 0.5 } else { 0.0 };
+            attitudes.push_felt(i * 33 * MS, 0.0, 0.026, 0.0, [gust - GRAVITY * 0.026_f32.sin(), 0.0]);
+        }
+        let mut velocity = Velocity::default();
+        velocity.begin(200 * MS, [0.0; 2], [0.0; 2]);
+        for i in 1..=13u64 {
+            let t = 0.06 * i as f32;
+            let place = [0.25 * t * t, 0.0];
+            velocity.place((200 + 60 * i) * MS, place, [0.0; 2], [0.0; 2], &attitudes, &frames);
+        }
+        let swept = velocity.at((200 + 60 * 13) * MS, &attitudes, &frames).unwrap();
+        assert!((swept.velocity[0] - 0.5 * 0.78).abs() < 0.03 && swept.velocity[1].abs() < 1e-3, "{swept:?}");
+        // The pilot takes 1.5 degrees for a tilt as long as nobody knows better; with what it is told of the air it comes
+        // to the same, and when the level is known the air is the draught.
+        assert!((swept.air[0] - (0.5 - GRAVITY * 0.026)).abs() < 0.03, "{swept:?}");
+        let level = Frames { level: [0.0, 0.026], ..frames };
+        let air = velocity.at((200 + 60 * 13) * MS, &attitudes, &level).unwrap().air;
+        assert!((air[0] - 0.5).abs() < 0.03, "{air:?}");
+    }
+
+    #[test]
     fn it_is_silent_when_nothing_is_measured() {
         let (attitudes, frames) = (level(), Frames::default());
         let mut velocity = Velocity::default();

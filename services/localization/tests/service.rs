@@ -81,6 +81,9 @@ struct Bench {
     _directory: tempfile::TempDir,
 }
 
+/// What the controller's roll and pitch read when the body is level.
+const LEVEL: (f32, f32) = (0.01, -0.012);
+
 struct Truth {
     x: f32,
     y: f32,
@@ -156,8 +159,11 @@ impl Bench {
         if ms.is_multiple_of(33) {
             let mut m = Attitude { sampled_ns: now - 8 * MS, ..Attitude::default() };
             let then = self.truth(m.sampled_ns);
-            (m.roll_rad, m.pitch_rad) = (then.roll + 0.01, then.pitch - 0.012);
+            (m.roll_rad, m.pitch_rad) = (then.roll + LEVEL.0, then.pitch + LEVEL.1);
             m.yaw_rad = mcl::wrap_angle(then.heading - OFFSET);
+            // Drag, and gravity in a frame that is not level.
+            m.force_x_m_s2 = -0.25 * then.vx.hypot(then.vy) - 9.81 * LEVEL.1.sin();
+            m.force_y_m_s2 = 9.81 * LEVEL.0.sin();
             self.attitude.publish(&m);
         }
         if ms.is_multiple_of(40) {

@@ -29,6 +29,10 @@ pub(crate) struct Controller {
     pub(crate) mute: bool,
     /// Roll and pitch in 0.1 degree, yaw in degrees clockwise.
     pub(crate) attitude: [i16; 3],
+    /// What the accelerometer reads, if the firmware answers several questions in one; `None` refuses it.
+    pub(crate) accelerometer: Option<[i16; 3]>,
+    /// Refusals are lost.
+    pub(crate) sullen: bool,
     pub(crate) armed: bool,
     pub(crate) booted: u64,
     pub(crate) log: Vec<Command>,
@@ -56,6 +60,8 @@ impl Controller {
             boxes: vec![0, 1, 27],
             mute: false,
             attitude: [0; 3],
+            accelerometer: Some([0, 0, 512]),
+            sullen: false,
             armed: false,
             booted: T0 - 10_000 * MS,
             log: Vec::new(),
@@ -147,7 +153,7 @@ impl Controller {
     pub(crate) fn pass(&mut self, now: u64) {
         if let Some((code, second, payload)) = self.queue.pop_front() {
             let answer = self.answer(now, code, &payload);
-            if !self.mute {
+            if !self.mute && (answer.is_some() || !self.sullen) {
                 self.send(now, second, code, answer.as_deref());
             }
         }
@@ -201,6 +207,15 @@ impl Controller {
             104 => words(&[1060, 1061, 1062, 1063, 0, 0, 0, 0]),
             105 => words(&self.rc),
             108 => words(&self.attitude.map(i16::cast_unsigned)),
+            230 => {
+                let accelerometer = self.accelerometer?;
+                let mut both = vec![6];
+                both.extend(words(&self.attitude.map(i16::cast_unsigned)));
+                both.push(18);
+                both.extend(words(&accelerometer.map(i16::cast_unsigned)));
+                both.extend([0; 12]);
+                both
+            }
             110 => vec![148, 10, 0, 255, 3, 0xd2, 4, 0xcb, 5],
             200 => {
                 self.take_channels(now, payload);

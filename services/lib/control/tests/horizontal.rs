@@ -216,3 +216,53 @@ fn without_poses_it_brakes_on_and_then_stays_level() {
     });
     assert!(most.fold(0.0, f32::max) < 0.05);
 }
+
+#[test]
+fn what_was_asked_for_already_is_not_asked_for_again() {
+    // 0.3 m/s too much was believed for four steps: the tilt against it is on its way, not yet to be read.
+    let config = VelocityConfig::default();
+    let flown = |velocity: f32| Flown {
+        velocity: Some(Vector::new(velocity, 0.0)),
+        trust: 1.0,
+        air: Vector::ZERO,
+        tilt: Tilt::default(),
+        tilt_age_s: 0.0,
+        heading: 0.0,
+        most_tilt_rad: 0.17,
+    };
+    let asked = |before: f32| {
+        let mut control = VelocityController::new(config, 0.0);
+        for _ in 0..4 {
+            control.step(0.02, Vector::ZERO, &flown(before));
+        }
+        let next = (0..10).map(|_| control.step(0.02, Vector::ZERO, &flown(0.0)).pitch);
+        next.fold(f32::NEG_INFINITY, f32::max)
+    };
+    assert!(asked(0.0).abs() < 1e-4);
+    assert!(asked(0.3) > 0.01, "the push on its way is braked before it is felt: {}", asked(0.3));
+}
+
+#[test]
+fn a_draught_that_is_told_is_leant_against_at_once() {
+    let flown = |air: Vector| Flown {
+        velocity: Some(Vector::ZERO),
+        trust: 1.0,
+        air,
+        tilt: Tilt::default(),
+        tilt_age_s: 0.0,
+        heading: 0.0,
+        most_tilt_rad: 0.17,
+    };
+    let mut control = VelocityController::new(VelocityConfig::default(), 0.25);
+    let mut tilt = Tilt::default();
+    for _ in 0..3 {
+        tilt = control.step(0.02, Vector::ZERO, &flown(Vector::new(0.3, 0.0)));
+    }
+    let held = tilt.acceleration(0.0).x;
+    assert!((-0.75..-0.3).contains(&held), "against 0.3 m/s2, and what it did meanwhile: {held}");
+    // What is no number, or no draught of a room, does no harm.
+    for wild in [f32::NAN, f32::INFINITY, 1e9] {
+        let tilt = control.step(0.02, Vector::ZERO, &flown(Vector::new(wild, 0.0)));
+        assert!(tilt.magnitude() <= 0.17 + 1e-3, "{wild}: {tilt:?}");
+    }
+}

@@ -194,3 +194,24 @@ fn what_does_not_fit_is_said() {
     let length = encode(&mut out, Version::V1, Direction::Reply, 116, &[7; 260]).unwrap();
     assert_eq!((length, &out[..7]), (268, &hex("24 4d 3e ff 74 04 01")[..]));
 }
+
+#[test]
+fn attitude_and_accelerometer_in_one() {
+    // MSP_MULTIPLE_MSP, 230 = e6, for 108 = 6c and 102 = 66.
+    assert_eq!(written(Version::V1, &AttitudeAndImu), hex("24 4d 3c 02 e6 6c 66 ee"));
+    // Roll 1.2 degrees, pitch -0.5, yaw 90; accelerometer 10 -20 512; gyroscope and compass behind it.
+    let both = hex("06 0c 00 fb ff 5a 00 12 0a 00 ec ff 00 02 01 00 02 00 03 00 00 00 00 00 00 00");
+    let reply = parse_reply(&AttitudeAndImu, &both).unwrap();
+    let attitude = AttitudeReply { roll_decidegrees: 12, pitch_decidegrees: -5, yaw_degrees: 90 };
+    assert_eq!(reply.attitude, attitude);
+    assert_eq!(reply.imu, Some(RawImuReply { accelerometer: [10, -20, 512] }));
+    // A board without an accelerometer answers nothing for it, an answer cut short likewise; without the attitude it
+    // is none.
+    for short in [&both[..7], &both[..8], &both[..12], &hex("06 0c 00 fb ff 5a 00 00")] {
+        let reply = parse_reply(&AttitudeAndImu, short).unwrap();
+        assert_eq!((reply.attitude, reply.imu), (attitude, None), "{short:02x?}");
+    }
+    for broken in [&both[..0], &both[..6], &hex("05 0c 00 fb ff 5a")] {
+        assert!(parse_reply(&AttitudeAndImu, broken).is_err(), "{broken:02x?}");
+    }
+}

@@ -17,6 +17,11 @@ impl Rig {
                 roll_rad: self.tilt.roll + self.level.roll + noise * self.noise.normal(),
                 pitch_rad: self.tilt.pitch + self.level.pitch + noise * self.noise.normal(),
                 yaw_rad: control::wrap_angle(self.heading - COMPASS),
+                sampled_ns: now,
+                // A firmware that does not tell: without it everything must fly too.
+                force_x_m_s2: f32::NAN,
+                force_y_m_s2: f32::NAN,
+                force_z_m_s2: f32::NAN,
                 ..Default::default()
             };
             attitude.header.stamp_ns = now;
@@ -77,6 +82,8 @@ impl Rig {
                 variance_y_m2: 0.0016,
                 velocity_sigma_m_s: 0.07,
                 heading_offset_rad: COMPASS,
+                air_x_m_s2: f32::NAN,
+                air_y_m_s2: f32::NAN,
                 level_roll_rad: known.roll,
                 level_pitch_rad: known.pitch,
                 p_lost: 0.001,

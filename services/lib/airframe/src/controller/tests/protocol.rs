@@ -13,6 +13,7 @@ fn payloads_have_the_lengths_of_the_table() {
         (3, 13),
         (101, 25),
         (150, 25),
+        (102, 18),
         (104, 16),
         (105, 36),
         (108, 6),
@@ -98,4 +99,18 @@ fn bench_motors_turn_only_while_disarmed_and_come_back() {
     bench.send(&IDLE);
     bench.run(0.3);
     assert_eq!(told(&bench), [1100, 1000, 1000, 1000], "old values come back");
+}
+
+#[test]
+fn several_answers_in_one_and_one_g_at_rest() {
+    let mut bench = Bench::new(1, 0.0, FailsafeSettings::default());
+    bench.run(2.0);
+    let (direction, both) = bench.ask(230, &[108, 102]);
+    assert_eq!((direction, both.len(), both[0], both[7]), (b'>', 26, 6, 18));
+    let word = |at: usize| i16::from_le_bytes([both[at], both[at + 1]]);
+    assert!(word(8).abs() < 6 && word(10).abs() < 6 && (506..=518).contains(&word(12)), "{both:02x?}");
+    assert_eq!(both[1..5], bench.ask(108, &[]).1[..4], "roll and pitch");
+    // What is not known is empty, nothing is in itself, and nothing asked for is an error.
+    assert_eq!(bench.ask(230, &[100, 230, 108]).1.len(), 1 + 7);
+    assert_eq!(bench.ask(230, &[]), (b'!', vec![]));
 }
