@@ -315,6 +315,12 @@ impl Core {
                 return setpoint;
             }
         }
+        if self.mission.goal() == Goal::Round && self.journey.look_again() {
+            self.mission.replanning(place);
+            self.blockage.reset();
+            self.steering.forget();
+            return setpoint;
+        }
         if self.journey.homeward() {
             self.mission.homeward();
         }

@@ -7,7 +7,7 @@ use crate::place::Place;
 use crate::track::{MAX_CORNERS, SHORTEST_M, Track};
 use core::fmt::{self, Write};
 use ipc_types::{MAX_WAYPOINTS, RoomProgress, Text};
-use patrol::{Bits, Costmap, RoomPlan, Round, RoutePlanner, Seen, Stop, Tally};
+use patrol::{Bits, Costmap, Obstacle, RoomPlan, Round, RoutePlanner, Seen, Stop, Tally};
 use std::sync::Arc;
 
 /// One slice of a route, in cells of 0.1 us.
@@ -20,6 +20,8 @@ const LOOK_EVERY_M: f32 = 0.15;
 const MAX_LOOKS: usize = 8192;
 /// Places that are given up for one round at most.
 pub(crate) const MAX_GIVEN_UP: usize = 64;
+/// So often in a round what stood in the way is believed to have moved on, when nothing is left to see but behind it.
+pub(crate) const AMNESTIES: u32 = 6;
 /// Work slices between two looks whether the next stops are still worth the way: once a second.
 pub(crate) const TRIM_EVERY: u32 = 20;
 
@@ -93,6 +95,8 @@ pub struct Journey {
     pub(crate) given_up: Vec<(f32, f32)>,
     fresh_starts: u32,
     amnesties: u32,
+    /// The doors that were found shut have been looked at again.
+    doors_again: bool,
     pub(crate) since_trim: u32,
     pub(crate) round: bool,
     trouble: Text<64>,
@@ -126,6 +130,7 @@ impl Journey {
             given_up: Vec::with_capacity(MAX_GIVEN_UP),
             fresh_starts: 0,
             amnesties: 0,
+            doors_again: false,
             since_trim: 0,
             round: false,
             trouble: Text::default(),
@@ -144,6 +149,7 @@ impl Journey {
         self.given_up.clear();
         self.tries = 0;
         self.amnesties = 0;
+        self.doors_again = false;
         self.looks.clear();
         self.seen_before.clear();
         self.review = false;
@@ -216,6 +222,30 @@ impl Journey {
         self.round
             && self.complete()
             && !self.stops[self.target.min(self.stops.len())..].iter().any(|stop| stop.look)
+    }
+
+    /// Before the drone turns home: what stood in the way may have moved on, and who stood in a door made it look shut. True
+    /// when the round is planned again for the rooms that were left out; once for doors, a few times for the rest.
+    pub fn look_again(&mut self) -> bool {
+        let skipped = |what: fn(&Obstacle) -> bool| {
+            self.rooms.iter().any(|room| room.skipped.as_ref().is_some_and(what))
+        };
+        let doors = !self.doors_again && skipped(|obstacle| matches!(obstacle, Obstacle::DoorClosed(_)));
+        let things = self.amnesties < AMNESTIES && skipped(|obstacle| *obstacle == Obstacle::Unmapped);
+        if !self.homeward() || !(doors || things) {
+            return false;
+        }
+        self.amnesties += 1;
+        self.map.set_unmapped(&Bits::default());
+        self.given_up.clear();
+        if !self.doors_again {
+            self.doors_again = true;
+            for door in 0..self.map.doors().len() {
+                self.map.set_door(door, false);
+            }
+        }
+        self.plan();
+        true
     }
 
     /// What the present leg is for.

@@ -31,7 +31,7 @@ impl Default for Limits {
         Self {
             radius_m: 0.225,
             margin_m: 0.15,
-            unmapped_margin_m: 0.18,
+            unmapped_margin_m: 0.15,
             comfort_m: 0.8,
             horizon_m: 3.5,
             view_m: 2.8,

@@ -1,6 +1,6 @@
 //! The slices in which a round and its legs are planned.
 
-use super::{Journey, ROUTE_NODES, SAME_STOP_M, Stage, Work};
+use super::{AMNESTIES, Journey, ROUTE_NODES, SAME_STOP_M, Stage, Work};
 use crate::mission::Goal;
 use crate::place::Place;
 use core::fmt::Write;
@@ -14,8 +14,6 @@ const ROUND_UNITS: usize = 1_800_000;
 const LOOKS_A_SLICE: usize = 60;
 /// Planning that failed is tried again with a clean slate this often.
 const FRESH_STARTS: u32 = 4;
-/// So often in a round what stood in the way is believed to have moved on, when nothing is left to see but behind it.
-const AMNESTIES: u32 = 6;
 /// Marks nearer to the drone than this are forgotten when it is walled in by them, metres.
 const FORGET_M: f32 = 1.0;
 
