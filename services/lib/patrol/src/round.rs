@@ -305,8 +305,13 @@ impl Round {
         let nodes = left / 30 + 1;
         let step = self.planner.advance(map, nodes);
         if step != Step::Working {
-            // A way to its middle and yet nothing to see there: it is too small to matter.
-            self.rooms[room].skipped = self.planner.obstacle();
+            // A way to its middle and yet nothing to see there: it is too small to matter. But a way out of a place that is
+            // walled in by things (the planner escapes from those) to where the round did not come: they bar it.
+            let barred = !map
+                .raster()
+                .cell(self.planner.goal().0, self.planner.goal().1)
+                .is_some_and(|c| self.reached[c]);
+            self.rooms[room].skipped = self.planner.obstacle().or(barred.then_some(Obstacle::Unmapped));
             self.asked = false;
             self.stage = next;
         }

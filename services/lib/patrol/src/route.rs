@@ -134,6 +134,11 @@ impl RoutePlanner {
         &self.route
     }
 
+    /// Where the way that was asked for last ends.
+    pub fn goal(&self) -> (f32, f32) {
+        self.to
+    }
+
     /// Why there is no way.
     pub fn obstacle(&self) -> Option<Obstacle> {
         self.obstacle
