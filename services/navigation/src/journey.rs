@@ -21,7 +21,7 @@ const MAX_LOOKS: usize = 8192;
 /// Places that are given up for one round at most.
 pub(crate) const MAX_GIVEN_UP: usize = 64;
 /// So often in a round what stood in the way is believed to have moved on, when nothing is left to see but behind it.
-pub(crate) const AMNESTIES: u32 = 6;
+const AMNESTIES: u32 = 6;
 /// Work slices between two looks whether the next stops are still worth the way: once a second.
 pub(crate) const TRIM_EVERY: u32 = 20;
 
@@ -224,27 +224,39 @@ impl Journey {
             && !self.stops[self.target.min(self.stops.len())..].iter().any(|stop| stop.look)
     }
 
-    /// Before the drone turns home: what stood in the way may have moved on, and who stood in a door made it look shut. True
-    /// when the round is planned again for the rooms that were left out; once for doors, a few times for the rest.
+    /// Before the drone turns home: true when the round is planned again for the rooms that were left out.
     pub fn look_again(&mut self) -> bool {
+        let again = self.homeward() && self.forgive();
+        if again {
+            self.plan();
+        }
+        again
+    }
+
+    /// What stood in the way may have moved on, and who stood in a door made it look shut: forgets them when rooms were left
+    /// out for that, the doors once (and whenever the drone is shut in behind them), the rest a few times.
+    pub(crate) fn forgive(&mut self) -> bool {
         let skipped = |what: fn(&Obstacle) -> bool| {
             self.rooms.iter().any(|room| room.skipped.as_ref().is_some_and(what))
         };
-        let doors = !self.doors_again && skipped(|obstacle| matches!(obstacle, Obstacle::DoorClosed(_)));
-        let things = self.amnesties < AMNESTIES && skipped(|obstacle| *obstacle == Obstacle::Unmapped);
-        if !self.homeward() || !(doors || things) {
+        let home = self.stops.last().and_then(|pad| pad.room).and_then(|room| self.rooms.get(room));
+        let shut_in = home.is_some_and(|home| home.skipped.is_some());
+        let patient = self.amnesties < AMNESTIES;
+        let reopened = !self.doors_again || (shut_in && patient);
+        let doors = reopened && skipped(|obstacle| matches!(obstacle, Obstacle::DoorClosed(_)));
+        let things = patient && skipped(|obstacle| *obstacle == Obstacle::Unmapped);
+        if !(doors || things) {
             return false;
         }
         self.amnesties += 1;
         self.map.set_unmapped(&Bits::default());
         self.given_up.clear();
-        if !self.doors_again {
+        if reopened {
             self.doors_again = true;
             for door in 0..self.map.doors().len() {
                 self.map.set_door(door, false);
             }
         }
-        self.plan();
         true
     }
 

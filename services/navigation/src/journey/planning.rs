@@ -1,6 +1,6 @@
 //! The slices in which a round and its legs are planned.
 
-use super::{AMNESTIES, Journey, ROUTE_NODES, SAME_STOP_M, Stage, Work};
+use super::{Journey, ROUTE_NODES, SAME_STOP_M, Stage, Work};
 use crate::mission::Goal;
 use crate::place::Place;
 use core::fmt::Write;
@@ -89,11 +89,7 @@ impl Journey {
                 };
                 self.stops.clear();
                 self.stops.extend(round.stops().iter().filter(wanted));
-                let behind = round.rooms().iter().any(|room| room.skipped == Some(Obstacle::Unmapped));
-                if behind && self.amnesties < AMNESTIES && !self.stops.iter().any(|stop| stop.look) {
-                    // People walk on: before the round is cut short, the way is tried again.
-                    self.amnesties += 1;
-                    self.map.set_unmapped(&Bits::default());
+                if !self.stops.iter().any(|stop| stop.look) && self.forgive() {
                     self.stage = Stage::Asked;
                     return Work::Busy;
                 }
