@@ -42,6 +42,8 @@ section! {
         felt_noise: f32,
         /// m per √s.
         position_noise: f32,
+        /// m per √m.
+        position_noise_per_m: f32,
         /// σ of the factor on the distance flown.
         distance_noise: f32,
         /// rad per √s.

@@ -3,6 +3,7 @@
 use crate::LocalizationConfig;
 use crate::attitude::{Attitudes, seconds};
 use crate::flow::{Flows, Frame};
+use crate::news::News;
 use crate::pose::{Walls, fill};
 use crate::predict::{Dynamics, predict};
 use crate::set::{MEMORY_GROUNDED, Set, columns, columns_mut, fold};
@@ -35,6 +36,10 @@ const WIDE_RAD: f32 = 20.0 * core::f32::consts::PI / 180.0;
 const WIDE_RAYS: usize = 21;
 /// With a place less sure than this, metres, echoes are compared with the wrong walls.
 const SURE_M: f32 = 0.2;
+/// The velocity that is flown by errs alike for so long, seconds: to the set, one update of it is a part of one witness.
+const SWEPT_S: f32 = 1.5;
+/// And it is never surer than this, m/s.
+const LEAST_SWEPT_M_S: f32 = 0.1;
 /// After so long, nanoseconds, a set that was sent and did not come back is given up and the last one that
 /// did is used again.
 const ECHO_TIMEOUT_NS: u64 = 100_000_000;
@@ -63,6 +68,7 @@ pub struct Localization {
     velocity: Velocity,
     waiting: Waiting,
     walls: Walls,
+    news: News,
     set: Set,
     /// Number and time of the last set sent.
     sent: u64,
@@ -121,6 +127,7 @@ impl Service for Localization {
             velocity: Velocity::default(),
             waiting: Waiting::default(),
             walls: Walls::default(),
+            news: News::default(),
             set: Set::None,
             sent: 0,
             sent_ns: 0,
@@ -339,22 +346,25 @@ impl Localization {
         let felt = self.level.map(|level| {
             [mean.force[0] + GRAVITY_M_S2 * level[1].tan(), mean.force[1] - GRAVITY_M_S2 * level[0].tan()]
         });
+        let dt_s = seconds(set.estimated_ns, time_ns) as f32;
         let motion = Motion {
             felt,
-            dt_s: seconds(set.estimated_ns, time_ns) as f32,
+            dt_s,
             blind_s: mean.blind_s,
             roll_rad: mean.roll,
             pitch_rad: mean.pitch,
             yaw_rad: mean.yaw,
-            flow: self.flows.take(time_ns, &self.attitudes, level),
+            flow: self.flows.take(time_ns, &self.attitudes, level).or_else(|| self.swept(time_ns, dt_s)),
             grounded: self.grounded,
         };
         let then = self.attitudes.at(time_ns).unwrap_or_default();
+        let news = self.news.follow(motion.dt_s, self.velocity.way, then.yaw);
         let sweep = group.map(|g| Sweep {
             readings: g.readings(),
             roll_rad: then.roll - level[0],
             pitch_rad: then.pitch - level[1],
             yaw_rad: then.yaw,
+            news,
         });
         let mut generator = Generator::from_state(set.generator);
         let update = self.filter.update(
@@ -396,6 +406,19 @@ impl Localization {
             }
         }
         self.believed = Some(believed);
+    }
+
+    /// What is flown by, as the set takes it while there is no flow: what ranges and poor floors show of the velocity.
+    fn swept(&self, time_ns: u64, dt_s: f32) -> Option<mcl::Flow> {
+        let frames = self.frames(self.believed.as_ref().filter(|_| dt_s > 0.0)?);
+        let swept = self.velocity.at(time_ns, &self.attitudes, &frames)?;
+        let (sin, cos) = (self.attitudes.at(time_ns)?.yaw + frames.heading_offset).sin_cos();
+        let [x, y] = swept.velocity;
+        Some(mcl::Flow {
+            velocity_x: cos * x + sin * y,
+            velocity_y: -sin * x + cos * y,
+            sigma: (swept.sigma * (SWEPT_S / dt_s).sqrt()).max(LEAST_SWEPT_M_S),
+        })
     }
 
     fn remember(&self, memory: &Memory) -> [f32; 16] {

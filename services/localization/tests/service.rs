@@ -324,6 +324,45 @@ fn silent_sonars_leave_it_guessing_and_saying_so() {
     assert_eq!(last.walls_in_echo, 0);
 }
 
+/// A floor that shows half of the motion, and no sonar: what the set gains by it in three seconds.
+#[test]
+fn a_poor_floor_holds_the_set_together() {
+    let sigma_after = |dim: bool| {
+        let mut bench = Bench::new(PAD).unwrap();
+        bench.run(1_000);
+        bench.take_off();
+        bench.run(5_000);
+        for _ in 0..3_000 {
+            let next = (bench.system.now() / MS + 1) * MS;
+            bench.system.run_until(next);
+            if ![40, 60].iter().any(|period| (next / MS).is_multiple_of(*period)) {
+                bench.sense(next);
+            }
+            if dim && (next / MS).is_multiple_of(40) {
+                bench.flow.publish(&FlowMotion {
+                    sampled_ns: next - 10 * MS,
+                    velocity_x_m_s: f32::NAN,
+                    velocity_y_m_s: f32::NAN,
+                    dim_x_m_s: 0.5 * SPEED,
+                    dim_y_m_s: 0.0,
+                    sigma_m_s: 0.15,
+                    ..FlowMotion::default()
+                });
+            }
+        }
+        let mut poses = Vec::new();
+        while let Some(pose) = bench.poses.receive() {
+            poses.push(*pose);
+        }
+        let last = poses.last().unwrap();
+        let t = bench.truth(last.estimated_ns);
+        assert!((last.x_m - t.x).hypot(last.y_m - t.y) < 0.4, "dim {dim}");
+        last.sigma_m()
+    };
+    let (blind, dim) = (sigma_after(false), sigma_after(true));
+    assert!(dim < 0.7 * blind, "{dim} over a poor floor, {blind} over one that shows nothing");
+}
+
 #[test]
 fn nonsense_is_refused_and_changes_nothing() {
     let mut bench = Bench::new(PAD).unwrap();

@@ -20,8 +20,11 @@ pub struct MotionConfig {
     pub velocity_noise: f32,
     /// The same where an accelerometer feels the gusts: a tilt that errs by 0.4 degrees for two seconds at a time.
     pub felt_noise: f32,
-    /// Roughening of the position, m per √s. FACTS 8: about 1 cm a ping of 60 ms.
+    /// Roughening of the position at rest, m per √s.
     pub position_noise: f32,
+    /// Roughening of the position with the way flown, m per √m: the scale of the flow, the plan's own errors. FACTS 8 has
+    /// 1 cm a ping of 60 ms, at any speed; a drone that waited in a corridor walked off along it by that.
+    pub position_noise_per_m: f32,
     /// σ of equation 2's factor 1 + N(0, σ²) on the distance flown.
     pub distance_noise: f32,
     /// Random walk of the heading offset at rest, rad per √s.
@@ -43,7 +46,8 @@ impl Default for MotionConfig {
         Self {
             velocity_noise: 0.35,
             felt_noise: 0.17,
-            position_noise: 0.05,
+            position_noise: 0.01,
+            position_noise_per_m: 0.05,
             distance_noise: 0.05,
             heading_noise: 0.02,
             heading_noise_per_m: 0.06,
@@ -60,6 +64,7 @@ impl MotionConfig {
         within("motion.velocity_noise", self.velocity_noise, 0.01..=3.0)?;
         within("motion.felt_noise", self.felt_noise, 0.01..=3.0)?;
         within("motion.position_noise", self.position_noise, 0.001..=1.0)?;
+        within("motion.position_noise_per_m", self.position_noise_per_m, 0.0..=1.0)?;
         within("motion.distance_noise", self.distance_noise, 0.0..=1.0)?;
         within("motion.heading_noise", self.heading_noise, 0.0..=1.0)?;
         within("motion.heading_noise_per_m", self.heading_noise_per_m, 0.0..=1.0)?;
@@ -97,7 +102,7 @@ pub struct Motion {
     /// Mean specific force of the air over the interval, body frame forward and left, m/s²: what an accelerometer feels
     /// beside the thrust. Drag is part of it.
     pub felt: Option<[f32; 2]>,
-    /// Velocity, when there is a flow sensor and it saw something.
+    /// Velocity, where something shows it: a flow sensor, or what else the caller knows.
     pub flow: Option<Flow>,
     /// On the ground: nothing moves.
     pub grounded: bool,
@@ -126,7 +131,8 @@ pub(crate) struct Step {
     flow_precision: f32,
     flow_cap: f32,
     velocity_sigma: f32,
-    position_sigma: f32,
+    position_variance: f32,
+    position_variance_per_m_s: f32,
     distance_sigma: f32,
     heading_variance: f32,
     heading_variance_per_m_s: f32,
@@ -175,7 +181,8 @@ impl Step {
             flow_precision,
             flow_cap: -config.flow_floor.ln(),
             velocity_sigma,
-            position_sigma: config.position_noise * widen * root,
+            position_variance: (config.position_noise * widen).powi(2) * dt,
+            position_variance_per_m_s: (config.position_noise_per_m * widen).powi(2) * dt,
             distance_sigma: config.distance_noise,
             heading_variance: (config.heading_noise * widen).powi(2) * dt,
             heading_variance_per_m_s: config.heading_noise_per_m.powi(2) * dt,
@@ -203,9 +210,9 @@ impl Step {
         let (vx, vy, ho) = (&mut p.velocity_x[..n], &mut p.velocity_y[..n], &mut p.heading_offset[..n]);
         let (lr, lp) = (&mut p.level_roll[..n], &mut p.level_pitch[..n]);
         for i in 0..n {
-            let speed2 = vx[i] * vx[i] + vy[i] * vy[i];
-            let heading_sigma =
-                (self.heading_variance + self.heading_variance_per_m_s * speed2.sqrt()).sqrt();
+            let speed = (vx[i] * vx[i] + vy[i] * vy[i]).sqrt();
+            let heading_sigma = (self.heading_variance + self.heading_variance_per_m_s * speed).sqrt();
+            let position_sigma = (self.position_variance + self.position_variance_per_m_s * speed).sqrt();
             let offset = wrap_angle(ho[i] + heading_sigma * n_heading[i]);
             let level_roll = lr[i] + self.level_sigma * n_roll[i];
             let level_pitch = lp[i] + self.level_sigma * n_pitch[i];
@@ -226,9 +233,9 @@ impl Step {
             let new_y = foretold_y + self.flow_gain * surprise_y + self.velocity_sigma * n_vy[i];
             let far = 0.5 * self.dt;
             x[i] += noisy_distance((vx[i] + new_x) * far, self.distance_sigma, n_distance[i])
-                + self.position_sigma * n_x[i];
+                + position_sigma * n_x[i];
             y[i] += noisy_distance((vy[i] + new_y) * far, self.distance_sigma, n_distance[i])
-                + self.position_sigma * n_y[i];
+                + position_sigma * n_y[i];
             vx[i] = new_x;
             vy[i] = new_y;
             ho[i] = offset;
@@ -240,8 +247,50 @@ impl Step {
 
 #[cfg(test)]
 mod tests {
-    use super::noisy_distance;
+    use super::*;
     use crate::generator::{Generator, Lanes};
+
+    /// N = 256 particles, each 50 steps of 60 ms; the standard error of a spread is 1 / √(2 · 256) = 4 %.
+    #[test]
+    fn what_stands_stays_together_and_what_flies_spreads() {
+        let config = MotionConfig::default();
+        let spread_after = |speed: f32| {
+            let mut lanes = Lanes::new(&mut Generator::new(5));
+            let mut noise = Box::new([[0.0; BLOCK]; NOISE_ROWS]);
+            let mut columns = [[0.0; BLOCK]; 8];
+            let [x, y, heading_offset, velocity_x, velocity_y, level_roll, level_pitch, weight] =
+                &mut columns;
+            velocity_x.fill(speed);
+            weight.fill(1.0 / BLOCK as f32);
+            // Foretold and measured alike to a millimetre a second: what spreads is the place.
+            let flow = Some(Flow { velocity_x: speed, velocity_y: 0.0, sigma: 0.001 });
+            let motion = Motion { dt_s: 0.06, felt: Some([0.0; 2]), flow, ..Motion::default() };
+            let step = Step::new(&config, &motion, 1.0);
+            for _ in 0..50 {
+                for row in noise.iter_mut() {
+                    lanes.fill_normal(row);
+                }
+                heading_offset.fill(0.0);
+                let mut particles = ParticlesMut {
+                    x,
+                    y,
+                    heading_offset,
+                    velocity_x,
+                    velocity_y,
+                    level_roll,
+                    level_pitch,
+                    weight,
+                };
+                step.apply(&mut particles, &noise);
+            }
+            // Across the way, where the distance's own factor has no part.
+            (y.iter().map(|y| y * y).sum::<f32>() / BLOCK as f32).sqrt()
+        };
+        let (stood, flew) = (spread_after(0.0), spread_after(0.4));
+        let expected = [0.01 * 3.0f32.sqrt(), (0.01f32.powi(2) * 3.0 + 0.05f32.powi(2) * 1.2).sqrt()];
+        assert!((stood / expected[0] - 1.0).abs() < 0.15, "{stood}");
+        assert!((flew / expected[1] - 1.0).abs() < 0.15, "{flew} over 1.2 m");
+    }
 
     /// Equation 2 as printed, and as meant. N = 80 000, standard error of the mean 0.1 / √N = 0.0004.
     #[test]

@@ -54,6 +54,9 @@ pub struct Sweep<'a> {
     pub pitch_rad: f32,
     /// Compass frame.
     pub yaw_rad: f32,
+    /// How much of the sweep is news, 0..=1: a drone that stands hears the same things again and again, and what is
+    /// wrong with them (something unmapped, a door ajar) is wrong each time.
+    pub news: f32,
 }
 
 /// The mixture from which a reading is thought to come. For a place from which the plan promises an echo
@@ -180,6 +183,8 @@ pub(crate) struct Beams {
     rows: Vec<Row>,
     beams: Vec<Beam>,
     used: usize,
+    /// Exponent on each likelihood of this sweep.
+    temper: f32,
     scale: f32,
     yaw: f32,
     /// Room for what passes between the loops of one block.
@@ -217,6 +222,7 @@ impl Beams {
             rows,
             beams: (0..MAX_READINGS).map(|_| beam()).collect(),
             used: 0,
+            temper: config.temper,
             scale: STEPS as f32 / config.max_range,
             yaw: 0.0,
             columns: Box::new([[0.0; BLOCK]; 9]),
@@ -231,6 +237,8 @@ impl Beams {
     pub(crate) fn prepare(&mut self, sweep: &Sweep<'_>) {
         self.used = 0;
         self.yaw = sweep.yaw_rad;
+        let news = if sweep.news.is_nan() { 1.0 } else { sweep.news.clamp(0.0, 1.0) };
+        self.temper = self.model.config.temper * news;
         if !sweep.yaw_rad.is_finite() {
             return;
         }
@@ -313,7 +321,7 @@ impl Beams {
             }
             beam.evidence += sum(&expected[..n]);
         }
-        let temper = self.model.config.temper;
+        let temper = self.temper;
         for i in 0..n {
             weight[i] *= power(product[i], temper);
         }
@@ -335,7 +343,7 @@ fn entry(steps: f32) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{Echo, Reading, STEPS, SonarModel, Sweep, entry};
+    use super::*;
     use crate::SonarConfig;
 
     fn model() -> SonarModel {
@@ -374,6 +382,37 @@ mod tests {
         assert!(m.likelihood(Echo::Range(2.0), 2.0) > 40.0 * short);
     }
 
+    struct Wall;
+
+    impl RangeMap for Wall {
+        fn range(&self, x: f32, _: f32, _: f32) -> f32 {
+            2.0 - x
+        }
+    }
+
+    #[test]
+    fn what_is_half_news_weighs_by_its_root() {
+        let reading = Reading {
+            echo: Echo::Range(2.0),
+            bearing_rad: 0.0,
+            elevation_rad: 0.0,
+            mount_x: 0.0,
+            mount_y: 0.0,
+        };
+        let ratio = |news: f32| {
+            let mut beams = Beams::new(&SonarConfig::default());
+            let readings = [reading];
+            beams.prepare(&Sweep { readings: &readings, roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0, news });
+            let mut weight = [1.0, 1.0];
+            beams.weigh(&Wall, &[0.0, 0.1], &[0.0; 2], &[0.0; 2], &mut weight);
+            weight[1] / weight[0]
+        };
+        assert!(ratio(1.0) < 0.9, "{}", ratio(1.0));
+        assert!((ratio(0.5) - ratio(1.0).sqrt()).abs() < 0.01, "{}", ratio(0.5));
+        assert!((ratio(0.0) - 1.0).abs() < 1e-4);
+        assert_eq!(ratio(f32::NAN), ratio(1.0));
+    }
+
     #[test]
     fn sensors_that_look_away_from_the_walls_say_nothing() {
         let reading = Reading {
@@ -383,7 +422,7 @@ mod tests {
             mount_x: 0.2,
             mount_y: 0.0,
         };
-        let level = Sweep { readings: &[], roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0 };
+        let level = Sweep { readings: &[], roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0, news: 1.0 };
         let m = model();
         assert_eq!(m.levelled(&reading, &level), Some(Echo::Range(1.0)));
         let down = Reading { elevation_rad: -1.57, ..reading };
