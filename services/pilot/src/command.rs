@@ -6,6 +6,10 @@ use control::SpoolUp;
 use core::fmt::Write;
 use ipc_types::{Command, LinkState, Phase, Text, Verb};
 
+/// A side sonar that has not answered for so long keeps the drone on the ground, seconds. Two pings lost in a row happen;
+/// in flight they close the sectors for a moment.
+const SIDES_S: f32 = 1.0;
+
 impl PilotCore {
     /// Obeys a command, once; says why not when it is refused.
     pub fn command(&mut self, now: u64, message: &Command) {
@@ -79,7 +83,7 @@ impl PilotCore {
     /// Writes why a take-off is refused; false when nothing stands in the way.
     fn why_not(&self, now: u64, out: &mut Text<96>) -> bool {
         let cell = self.flight.cell_volts;
-        let silent = self.shield.silent(now).0;
+        let silent = self.shield.silent_for(now, SIDES_S);
         let policy = &self.config.failsafe;
         // A sentence that does not fit is cut; its beginning says what matters.
         let _ = if age_s(self.flight.at, now) > 1.0 {

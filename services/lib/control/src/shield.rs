@@ -225,6 +225,13 @@ impl Shield {
         all.fold((0, 0), |(silent, all), s| (silent + u32::from(self.fresh(s, now).is_none()), all + 1))
     }
 
+    /// How many of the side sonars have not answered for so long, seconds.
+    #[must_use]
+    pub fn silent_for(&self, now: u64, longer_s: f32) -> u32 {
+        let silent = |s: &&Sensor| s.look.is_none_or(|look| seconds(look.at_ns, now) > longer_s);
+        self.sensors.iter().flatten().filter(silent).count() as u32
+    }
+
     fn fresh(&self, sensor: &Sensor, now: u64) -> Option<Look> {
         sensor.look.filter(|look| seconds(look.at_ns, now) <= self.config.stale_turns * self.sweep_s)
     }

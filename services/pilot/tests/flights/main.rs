@@ -273,6 +273,16 @@ fn a_take_off_is_refused_in_words() {
 }
 
 #[test]
+fn two_lost_pings_do_not_keep_it_on_the_ground() {
+    let mut rig = Rig::new(1);
+    rig.run(1.5);
+    rig.sides_dead = true;
+    rig.run(0.7);
+    rig.order(Verb::TakeOff);
+    assert_eq!(rig.phase(), Phase::Arming, "{}", rig.core.sentence());
+}
+
+#[test]
 fn a_controller_that_does_not_arm_ends_the_take_off() {
     let mut rig = Rig::new(1);
     rig.will_arm = false;
