@@ -22,6 +22,8 @@ const MAX_LOOKS: usize = 8192;
 pub(crate) const MAX_GIVEN_UP: usize = 64;
 /// So often in a round what stood in the way is believed to have moved on, when nothing is left to see but behind it.
 const AMNESTIES: u32 = 6;
+/// Share of the building behind doors that are taken for shut beyond which they are tried again and again.
+const MUCH: f32 = 0.25;
 /// Work slices between two looks whether the next stops are still worth the way: once a second.
 pub(crate) const TRIM_EVERY: u32 = 20;
 
@@ -97,6 +99,8 @@ pub struct Journey {
     amnesties: u32,
     /// The doors that were found shut have been looked at again.
     doors_again: bool,
+    /// How often each door was found shut in this round.
+    pub(crate) found_shut: Vec<u32>,
     pub(crate) since_trim: u32,
     pub(crate) round: bool,
     trouble: Text<64>,
@@ -131,6 +135,7 @@ impl Journey {
             fresh_starts: 0,
             amnesties: 0,
             doors_again: false,
+            found_shut: vec![0; map.doors().len()],
             since_trim: 0,
             round: false,
             trouble: Text::default(),
@@ -150,6 +155,7 @@ impl Journey {
         self.tries = 0;
         self.amnesties = 0;
         self.doors_again = false;
+        self.found_shut.fill(0);
         self.looks.clear();
         self.seen_before.clear();
         self.review = false;
@@ -234,30 +240,44 @@ impl Journey {
     }
 
     /// What stood in the way may have moved on, and who stood in a door made it look shut: forgets them when rooms were left
-    /// out for that, the doors once (and whenever the drone is shut in behind them), the rest a few times.
+    /// out for that. Things a few times; doors once, and as often as things while much of the building lies behind them:
+    /// then those first that were found shut least often.
     pub(crate) fn forgive(&mut self) -> bool {
-        let skipped = |what: fn(&Obstacle) -> bool| {
-            self.rooms.iter().any(|room| room.skipped.as_ref().is_some_and(what))
-        };
-        let home = self.stops.last().and_then(|pad| pad.room).and_then(|room| self.rooms.get(room));
-        let shut_in = home.is_some_and(|home| home.skipped.is_some());
         let patient = self.amnesties < AMNESTIES;
-        let reopened = !self.doors_again || (shut_in && patient);
-        let doors = reopened && skipped(|obstacle| matches!(obstacle, Obstacle::DoorClosed(_)));
-        let things = patient && skipped(|obstacle| *obstacle == Obstacle::Unmapped);
+        let things = patient && self.rooms.iter().any(|room| room.skipped == Some(Obstacle::Unmapped));
+        let doors = self.behind_doors();
+        let doors = if self.doors_again { patient && doors > MUCH } else { doors > 0.0 };
         if !(doors || things) {
             return false;
         }
         self.amnesties += 1;
         self.map.set_unmapped(&Bits::default());
         self.given_up.clear();
-        if reopened {
-            self.doors_again = true;
+        if doors {
+            let shut = |door: &usize| self.map.door_closed(*door);
+            let times = |door: usize| self.found_shut.get(door).copied().unwrap_or_default();
+            let least = (0..self.map.doors().len()).filter(shut).map(times).min().unwrap_or_default();
             for door in 0..self.map.doors().len() {
-                self.map.set_door(door, false);
+                if !self.doors_again || times(door) <= least {
+                    self.map.set_door(door, false);
+                }
             }
+            self.doors_again = true;
         }
         true
+    }
+
+    /// Share of the building's floor in rooms that are left out because of a shut door. While the drone is shut in itself,
+    /// away from the pad, all.
+    fn behind_doors(&self) -> f32 {
+        let behind = |room: &&RoomPlan| matches!(room.skipped, Some(Obstacle::DoorClosed(_)));
+        let home = self.stops.last().and_then(|pad| pad.room).and_then(|room| self.rooms.get(room));
+        if home.as_ref().is_some_and(behind) {
+            return 1.0;
+        }
+        let floor: usize = self.rooms.iter().map(|room| room.floor).sum();
+        let shut: usize = self.rooms.iter().filter(behind).map(|room| room.floor).sum();
+        shut as f32 / floor.max(1) as f32
     }
 
     /// What the present leg is for.

@@ -55,6 +55,9 @@ impl Journey {
         let (x, y) = (place.x + nearest * cos, place.y + nearest * sin);
         if let Some(door) = self.map.door_near(x, y, DOOR_M) {
             self.map.set_door(door, true);
+            if let Some(times) = self.found_shut.get_mut(door) {
+                *times += 1;
+            }
             self.review = true;
             // The line between the posts is marked too: it survives a restart, the door's state does not.
             if let Some((a, b)) = self.map.doors().get(door).map(|door| (door.a, door.b)) {

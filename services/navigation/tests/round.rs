@@ -262,6 +262,31 @@ fn rooms_behind_shut_doors_are_skipped_by_name_with_the_reason() {
     assert_eq!(room(&patrol, "West").state, u32::from(RoomState::Seen.code()));
 }
 
+/// Somebody stands in the North door three times that the drone comes by, and is gone afterwards; the South door stays shut.
+#[test]
+fn while_most_of_the_building_lies_behind_them_doors_are_tried_again() {
+    let mut flight = Flight::new(&[0, 1], &[]);
+    flight.order(Verb::PatrolStart, f32::NAN, f32::NAN);
+    let (mut found_shut, mut before) = (0, false);
+    for _ in 0..8000 {
+        flight.step();
+        if matches!(flight.core.mission().state(), PatrolState::Done | PatrolState::Failed) {
+            break;
+        }
+        let shut = flight.core.journey().map().door_closed(1);
+        found_shut += u32::from(shut && !before);
+        before = shut;
+        if found_shut == 3 && shut {
+            let (rows, _) = building(&[0], &[]);
+            flight.world = world(&rows.iter().map(String::as_str).collect::<Vec<_>>(), 0.1);
+        }
+    }
+    assert_eq!(flight.core.mission().state(), PatrolState::Done, "{}", flight.core.text());
+    assert!(found_shut >= 3, "{found_shut}");
+    assert!(flight.report().coverage > 0.95, "{}", flight.report().coverage);
+    assert!(flight.least_gap > 0.1, "{}", flight.least_gap);
+}
+
 #[test]
 fn boxes_that_are_not_on_the_plan_are_flown_around() {
     let mut flight = Flight::new(&[], &[(20, 25, 24, 29), (55, 10, 58, 14), (60, 42, 62, 48)]);
