@@ -54,7 +54,7 @@ impl Default for NavigationConfig {
             look_ahead_m: 1.0,
             narrow_m: 0.7,
             stop_gap_m: 0.6,
-            wait_s: 4.0,
+            wait_s: 8.0,
             stuck_s: 12.0,
             tries: 3,
             pad_m: 0.12,
