@@ -234,11 +234,11 @@ impl<M: RangeMap> Filter<M> {
                 self.compared(sweep, &estimate).map(|(_, range, expected, sigmas)| range < expected - sigmas);
             let evidence =
                 self.beams.evidence(prior).zip(heard).map(|((set, blind), short)| (set, blind, short));
-            self.config.trust.step(memory.p_lost, motion.dt_s, evidence)
+            self.config.trust.step(memory.p_lost, motion.dt_s, sweep.news(), evidence)
         } else if motion.grounded {
             memory.p_lost
         } else {
-            self.config.trust.step(memory.p_lost, motion.dt_s, core::iter::empty())
+            self.config.trust.step(memory.p_lost, motion.dt_s, 1.0, core::iter::empty())
         };
         let estimate = estimate.doubted(doubt);
         let memory =

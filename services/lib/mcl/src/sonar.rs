@@ -19,6 +19,9 @@ const ROUND: f32 = 8_388_608.0;
 /// squeezed into less room.
 const NEAREST: f32 = 0.05;
 
+/// What a sweep counts that is no news: the noise of each reading is new.
+const STALE: f32 = 0.5;
+
 /// What came back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Echo {
@@ -57,6 +60,13 @@ pub struct Sweep<'a> {
     /// How much of the sweep is news, 0..=1: a drone that stands hears the same things again and again, and what is
     /// wrong with them (something unmapped, a door ajar) is wrong each time.
     pub news: f32,
+}
+
+impl Sweep<'_> {
+    /// How much of it is news, whatever was said: 0..=1.
+    pub(crate) fn news(&self) -> f32 {
+        if self.news.is_nan() { 1.0 } else { self.news.clamp(0.0, 1.0) }
+    }
 }
 
 /// The mixture from which a reading is thought to come. For a place from which the plan promises an echo
@@ -237,8 +247,7 @@ impl Beams {
     pub(crate) fn prepare(&mut self, sweep: &Sweep<'_>) {
         self.used = 0;
         self.yaw = sweep.yaw_rad;
-        let news = if sweep.news.is_nan() { 1.0 } else { sweep.news.clamp(0.0, 1.0) };
-        self.temper = self.model.config.temper * news;
+        self.temper = self.model.config.temper * sweep.news().max(STALE);
         if !sweep.yaw_rad.is_finite() {
             return;
         }
@@ -391,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_half_news_weighs_by_its_root() {
+    fn what_is_no_news_weighs_less() {
         let reading = Reading {
             echo: Echo::Range(2.0),
             bearing_rad: 0.0,
@@ -408,8 +417,8 @@ mod tests {
             weight[1] / weight[0]
         };
         assert!(ratio(1.0) < 0.9, "{}", ratio(1.0));
-        assert!((ratio(0.5) - ratio(1.0).sqrt()).abs() < 0.01, "{}", ratio(0.5));
-        assert!((ratio(0.0) - 1.0).abs() < 1e-4);
+        assert!((ratio(0.7) - ratio(1.0).powf(0.7)).abs() < 0.01, "{}", ratio(0.7));
+        assert!((ratio(0.0) - ratio(1.0).powf(STALE)).abs() < 0.01, "{}", ratio(0.0));
         assert_eq!(ratio(f32::NAN), ratio(1.0));
     }
 

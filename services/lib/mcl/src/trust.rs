@@ -2,6 +2,9 @@
 
 use crate::config::{ConfigError, within};
 
+/// What the readings of a drone that stands say of being lost: what stands beside it is on no plan each time again.
+const STALE: f32 = 0.1;
+
 /// How doubt grows and fades.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrustConfig {
@@ -47,18 +50,27 @@ impl TrustConfig {
 
     /// P(lost) after `dt` seconds and readings with the given (likelihood by the set, likelihood to one
     /// who does not know the place, whether it is too short): a two-state hidden Markov chain. Where the readings fit the set
-    /// better than they fit any place, doubt falls; unmapped things raise it by a bounded amount each.
-    pub(crate) fn step(&self, p_lost: f32, dt: f32, evidence: impl Iterator<Item = (f32, f32, bool)>) -> f32 {
+    /// better than they fit any place, doubt falls; unmapped things raise it by a bounded amount each. Readings that are
+    /// hardly `news` (0..=1) say little, and where nothing moves nobody gets lost.
+    pub(crate) fn step(
+        &self,
+        p_lost: f32,
+        dt: f32,
+        news: f32,
+        evidence: impl Iterator<Item = (f32, f32, bool)>,
+    ) -> f32 {
         let p = if (0.0..=1.0).contains(&p_lost) { p_lost } else { 0.5 };
         let dt = dt.clamp(0.0, 5.0);
-        let p = p + (1.0 - p) * (self.hazard_per_s * dt).min(0.5) - p * (self.recovery_per_s * dt).min(0.5);
+        let news = news.max(STALE);
+        let p = p + (1.0 - p) * (self.hazard_per_s * news * dt).min(0.5)
+            - p * (self.recovery_per_s * dt).min(0.5);
         let p = p.clamp(1e-6, 1.0 - 1e-6);
         let mut odds = (p / (1.0 - p)).ln();
         for (by_set, blind, short) in evidence {
             let raise = if short { self.raise_short } else { self.raise };
             let ratio = (blind.max(1e-6) / by_set.max(1e-6)).ln() * self.temper;
             // NaN (a broken set) counts as the worst reading.
-            odds += if ratio.is_nan() { self.raise } else { ratio.clamp(-self.lower, raise) };
+            odds += news * if ratio.is_nan() { self.raise } else { ratio.clamp(-self.lower, raise) };
         }
         1.0 / (1.0 + (-odds).exp())
     }
@@ -71,7 +83,7 @@ mod tests {
     /// One pair of readings each 60 ms, as (by the set, blind).
     fn after(seconds: f32, pair: [(f32, f32, bool); 2]) -> f32 {
         let t = TrustConfig::default();
-        (0..(seconds / 0.06) as usize).fold(0.01, |p, _| t.step(p, 0.06, pair.into_iter()))
+        (0..(seconds / 0.06) as usize).fold(0.01, |p, _| t.step(p, 0.06, 1.0, pair.into_iter()))
     }
 
     const HIT: (f32, f32, bool) = (4.0, 0.3, false);
@@ -83,7 +95,7 @@ mod tests {
         assert!(after(10.0, [HIT, HIT]) < 0.005);
         let clutter = after(10.0, [HIT, HIT]).max((0..80).fold(0.01, |p, i| {
             let second = if i % 5 < 3 { WRONG } else { HIT };
-            TrustConfig::default().step(p, 0.06, [HIT, second].into_iter())
+            TrustConfig::default().step(p, 0.06, 1.0, [HIT, second].into_iter())
         }));
         assert!(clutter < 0.05, "three in ten readings hit unmapped things: {clutter}");
         assert!(after(3.0, [WRONG, WRONG]) > 0.9, "nothing fits for three seconds");
@@ -93,9 +105,20 @@ mod tests {
     }
 
     #[test]
+    fn a_drone_that_waits_beside_something_unmapped_is_not_lost() {
+        let t = TrustConfig::default();
+        let waited = |seconds: f32, pair: [(f32, f32, bool); 2]| {
+            (0..(seconds / 0.06) as usize).fold(0.005, |p, _| t.step(p, 0.06, 0.0, pair.into_iter()))
+        };
+        assert!(waited(4.0, [SHORT, SHORT]) < 0.05, "{}", waited(4.0, [SHORT, SHORT]));
+        assert!(waited(30.0, [HIT, SHORT]) < 0.005);
+        assert!(waited(20.0, [WRONG, WRONG]) > 0.9, "carried off, it notices all the same");
+    }
+
+    #[test]
     fn broken_evidence_is_doubt() {
         let t = TrustConfig::default();
-        assert!(t.step(0.1, 0.06, [(f32::NAN, 0.3, false)].into_iter()) > 0.1);
-        assert!((0.0..=1.0).contains(&t.step(f32::NAN, f32::NAN, [HIT].into_iter())));
+        assert!(t.step(0.1, 0.06, 1.0, [(f32::NAN, 0.3, false)].into_iter()) > 0.1);
+        assert!((0.0..=1.0).contains(&t.step(f32::NAN, f32::NAN, f32::NAN, [HIT].into_iter())));
     }
 }
