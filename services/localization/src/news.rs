@@ -17,11 +17,17 @@ const TURNED_RAD: f32 = 0.6;
 pub(crate) struct News {
     /// Way and heading, both late by [`OVER_S`].
     late: Option<([f32; 2], f32)>,
+    /// Time since it began, seconds: what was heard before is not known.
+    age_s: f32,
 }
 
 impl News {
     /// Follows the summed-up way, plan frame, and the heading, and says how much of a sweep is news now: 0..=1.
     pub(crate) fn follow(&mut self, dt_s: f32, way: [f32; 2], heading: f32) -> f32 {
+        if self.late.is_none() {
+            self.age_s = 0.0;
+        }
+        self.age_s += dt_s.max(0.0);
         let (late, turned_from) = self.late.unwrap_or((way, heading));
         let gone = [way[0] - late[0], way[1] - late[1]];
         let turned = wrap_angle(heading - turned_from);
@@ -31,7 +37,7 @@ impl News {
         let news = (gone[0].hypot(gone[1]) / FAR_M).hypot(turned / TURNED_RAD);
         self.late = (late.iter().all(|axis| axis.is_finite()) && turned_from.is_finite())
             .then_some((late, turned_from));
-        if news.is_nan() { 1.0 } else { news.min(1.0) }
+        if self.late.is_none() || self.age_s < OVER_S { 1.0 } else { news.min(1.0) }
     }
 }
 
@@ -60,8 +66,12 @@ mod tests {
     #[test]
     fn nonsense_counts_in_full_and_is_forgotten() {
         let mut news = News::default();
-        assert_eq!(news.follow(0.06, [f32::NAN, 0.0], 0.0), 1.0);
-        assert_eq!(news.follow(f32::NAN, [0.0; 2], 0.0), 0.0);
-        assert_eq!(news.follow(0.06, [0.0; 2], 0.0), 0.0);
+        let rest = |news: &mut News| (0..50).fold(f32::NAN, |_, _| news.follow(0.06, [0.0; 2], 0.0));
+        assert_eq!(news.follow(0.06, [0.0; 2], 0.0), 1.0, "after a restart nothing was heard before");
+        assert_eq!(rest(&mut news), 0.0);
+        for (dt_s, x) in [(0.06, f32::NAN), (f32::NAN, 0.0)] {
+            assert_eq!(news.follow(dt_s, [x, 0.0], 0.0), 1.0);
+            assert_eq!(rest(&mut news), 0.0);
+        }
     }
 }

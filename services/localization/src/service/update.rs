@@ -1,0 +1,183 @@
+//! From one set to the next.
+
+use super::{Believed, Localization};
+use crate::attitude::seconds;
+use crate::predict::{Dynamics, predict};
+use crate::set::{MEMORY_GROUNDED, columns, columns_mut};
+use crate::sweep::Group;
+use crate::velocity::Frames;
+use floorplan::cast_cone;
+use mcl::{Generator, Memory, Motion, Sweep, wrap_angle};
+
+/// Attitudes averaged before the first set is drawn: a quarter of a second at 30 Hz, enough for the whole
+/// degrees in which a controller gives its yaw.
+const RESTING_SAMPLES: usize = 8;
+/// m/s².
+const GRAVITY_M_S2: f32 = 9.806_65;
+/// Tilt on the ground beyond which it is the ground that slopes, radians; the level error of a calibrated
+/// controller is smaller.
+const LARGEST_LEVEL: f32 = 0.05;
+/// Doubt of a set that was drawn in the air because nothing better was left.
+const HOPELESS: f32 = 0.9;
+/// With a place less sure than this, metres, echoes are compared with the wrong walls.
+const SURE_M: f32 = 0.2;
+/// The velocity that is flown by errs alike for so long, seconds: to the set, one update of it is a part of one witness.
+const SWEPT_S: f32 = 1.5;
+/// And it is never surer than this, m/s.
+const LEAST_SWEPT_M_S: f32 = 0.1;
+
+impl Localization {
+    /// Draws the first set around the start, once the attitude has settled.
+    pub(super) fn begin(&mut self, now: u64) {
+        if self.attitudes.len() < RESTING_SAMPLES {
+            return;
+        }
+        let (Some(resting), Some(mut loan)) = (self.attitudes.resting(), self.particles.loan()) else {
+            return;
+        };
+        let level = |angle: f32| if self.grounded { angle.clamp(-LARGEST_LEVEL, LARGEST_LEVEL) } else { 0.0 };
+        let start = &self.config.start;
+        let start = mcl::Start {
+            x: self.pad.x,
+            y: self.pad.y,
+            sigma: start.sigma_m,
+            heading_offset: wrap_angle(self.pad.heading - resting.yaw),
+            heading_sigma: start.heading_sigma_deg.to_radians(),
+            level_roll: level(resting.roll),
+            level_pitch: level(resting.pitch),
+            level_sigma: start.level_sigma_deg.to_radians(),
+            p_lost: if self.grounded { 0.01 } else { HOPELESS },
+        };
+        self.level = self.grounded.then_some([start.level_roll, start.level_pitch]);
+        let mut generator = Generator::new(self.seed);
+        let update = self.filter.start_at(&start, columns_mut(&mut loan), &mut generator);
+        loan.estimated_ns = now;
+        loan.updates = self.sent + 1;
+        loan.generator = generator.state();
+        loan.memory = self.remember(&update.memory);
+        loan.count = update.count as u32;
+        loan.plan = self.plan;
+        loan.send();
+        self.sent += 1;
+        self.sent_ns = now;
+        self.believed = Some(Believed { time_ns: now, estimate: update.estimate, count: update.count });
+    }
+
+    /// Reads the last set, writes the next for `time_ns` into a fresh loan and sends it.
+    pub(super) fn update(&mut self, time_ns: u64, group: Option<&Group>, now: u64) {
+        let Some(set) = self.set.get() else { return };
+        let Some(mut loan) = self.particles.loan() else { return };
+        let memory = Memory::from_array(&set.memory);
+        let level = self.believed.map_or([0.0; 2], |b| [b.estimate.level_roll, b.estimate.level_pitch]);
+        let mean = self.attitudes.mean(set.estimated_ns, time_ns);
+        // What the accelerometer reads of gravity, because it sits aslant, is no motion: as it stood on the ground.
+        if self.believed.is_some() {
+            self.level.get_or_insert(level);
+        }
+        let felt = self.level.map(|level| {
+            [mean.force[0] + GRAVITY_M_S2 * level[1].tan(), mean.force[1] - GRAVITY_M_S2 * level[0].tan()]
+        });
+        let dt_s = seconds(set.estimated_ns, time_ns) as f32;
+        let motion = Motion {
+            felt,
+            dt_s,
+            blind_s: mean.blind_s,
+            roll_rad: mean.roll,
+            pitch_rad: mean.pitch,
+            yaw_rad: mean.yaw,
+            flow: self.flows.take(time_ns, &self.attitudes, level).or_else(|| self.swept(time_ns, dt_s)),
+            grounded: self.grounded,
+        };
+        let then = self.attitudes.at(time_ns).unwrap_or_default();
+        let news = self.news.follow(motion.dt_s, self.velocity.way, then.yaw);
+        let sweep = group.map(|g| Sweep {
+            readings: g.readings(),
+            roll_rad: then.roll - level[0],
+            pitch_rad: then.pitch - level[1],
+            yaw_rad: then.yaw,
+            news,
+        });
+        let mut generator = Generator::from_state(set.generator);
+        let update = self.filter.update(
+            columns(set),
+            &memory,
+            &motion,
+            sweep.as_ref(),
+            columns_mut(&mut loan),
+            &mut generator,
+        );
+        if update.count == 0 {
+            return;
+        }
+        if let Some(group) = group {
+            self.walls.take(&group.sensors[..group.count], update.fits, time_ns);
+        }
+        loan.estimated_ns = time_ns;
+        loan.updates = self.sent + 1;
+        loan.generator = generator.state();
+        loan.memory = self.remember(&update.memory);
+        loan.count = update.count as u32;
+        loan.plan = self.plan;
+        loan.send();
+        self.sent += 1;
+        self.sent_ns = now;
+        let believed = Believed { time_ns, estimate: update.estimate, count: update.count };
+        let (e, frames) = (&believed.estimate, self.frames(&believed));
+        if let Some(group) = group {
+            let (place, velocity) = ([e.x, e.y], [e.velocity_x, e.velocity_y]);
+            let spread = [e.variance_x, e.variance_y].map(f32::sqrt);
+            self.velocity.place(time_ns, place, spread, velocity, &self.attitudes, &frames);
+            // Only where the walls are known to be the ones meant.
+            let sure = e.sigma() < SURE_M;
+            let plan = self.table.plan();
+            for ranged in group.ranged().filter(|_| sure) {
+                self.velocity.range(time_ns, &ranged, &self.attitudes, &frames, |x, y, angle| {
+                    cast_cone(plan, &self.cone, x, y, angle)
+                });
+            }
+        }
+        self.believed = Some(believed);
+    }
+
+    /// What is flown by, as the set takes it while there is no flow: what ranges and poor floors show of the velocity.
+    fn swept(&self, time_ns: u64, dt_s: f32) -> Option<mcl::Flow> {
+        let frames = self.frames(self.believed.as_ref().filter(|_| dt_s > 0.0)?);
+        let swept = self.velocity.at(time_ns, &self.attitudes, &frames)?;
+        let (sin, cos) = (self.attitudes.at(time_ns)?.yaw + frames.heading_offset).sin_cos();
+        let [x, y] = swept.velocity;
+        Some(mcl::Flow {
+            velocity_x: cos * x + sin * y,
+            velocity_y: -sin * x + cos * y,
+            sigma: (swept.sigma * (SWEPT_S / dt_s).sqrt()).max(LEAST_SWEPT_M_S),
+        })
+    }
+
+    fn remember(&self, memory: &Memory) -> [f32; 16] {
+        let mut out = memory.to_array();
+        out[MEMORY_GROUNDED] = if self.grounded { 1.0 } else { 0.0 };
+        out
+    }
+
+    pub(super) fn frames(&self, b: &Believed) -> Frames {
+        let e = &b.estimate;
+        let level = [e.level_roll, e.level_pitch];
+        Frames { heading_offset: e.heading_offset, level, drag: self.config.motion.drag }
+    }
+
+    pub(super) fn predicted(&self, b: &Believed, to_ns: u64, with_flow: bool) -> crate::predict::Predicted {
+        let motion = &self.config.motion;
+        let dynamics = Dynamics { drag: motion.drag, velocity_noise: motion.velocity_noise };
+        let flows = if with_flow { self.flows.waiting() } else { &[] };
+        let mut p = predict(&b.estimate, dynamics, b.time_ns, to_ns, &self.attitudes, flows);
+        if let Some(swept) = self.velocity.at(to_ns, &self.attitudes, &self.frames(b)) {
+            (p.velocity, p.velocity_sigma, p.air) = (swept.velocity, swept.sigma, swept.air);
+        }
+        if self.grounded {
+            p.position = [b.estimate.x, b.estimate.y];
+            p.velocity = [0.0; 2];
+            p.air = [f32::NAN; 2];
+            p.variance = 0.0;
+        }
+        p
+    }
+}
