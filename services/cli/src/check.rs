@@ -1,6 +1,6 @@
 //! Checks before anything flies.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use cli::place::Place;
 use runtime::{Cache, Service, Start, Validate};
 use std::path::Path;
@@ -49,6 +49,7 @@ pub(crate) fn check(place: &Place, json: bool) -> Result<ExitCode> {
             plan.height(),
             plan.resolution()
         ));
+        said.extend(reach(&start)?);
     }
     said.dedup();
     if json {
@@ -61,6 +62,32 @@ pub(crate) fn check(place: &Place, json: bool) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Whether the vehicle fits on the pad, and which rooms it cannot get to.
+fn reach(start: &Start) -> Result<Vec<String>> {
+    let atlas = navigation::atlas_of(start)?;
+    let name = start.sidecar_name();
+    let Some((x, y)) = atlas.pad() else {
+        return Ok(vec![format!(
+            "{name}: names no pad: the localization configuration must say where the drone starts"
+        )]);
+    };
+    let (needed, free) = (start.vehicle.body.radius_m, atlas.field().distance(x, y));
+    if free < needed {
+        bail!(
+            "{name}: pad ({x}, {y}) is {free:.2} m from what is not free on the plan; {} needs {needed:.2} m",
+            start.system.vehicle
+        );
+    }
+    let Some(left_out) = atlas.left_out() else {
+        bail!("{name}: from the pad ({x}, {y}) there is no way to anywhere");
+    };
+    let rooms = atlas.rooms().len();
+    let mut said =
+        vec![format!("{name}: {} of {rooms} rooms can be reached from the pad", rooms - left_out.len())];
+    said.extend(left_out.iter().map(|(room, reason)| format!("{name}: left out: {room}: {reason}")));
+    Ok(said)
+}
+
 fn config<S: Service>(manifest: &manifest::Manifest, root: &Path) -> Result<()> {
     let Some(entry) = manifest.services.get(S::NAME) else { return Ok(()) };
     if entry.config.is_empty() {
@@ -69,7 +96,7 @@ fn config<S: Service>(manifest: &manifest::Manifest, root: &Path) -> Result<()> 
     }
     let path = root.join(&entry.config);
     let text = std::fs::read_to_string(&path)
-        .map_err(|source| runtime::StartError::Read { path: path.display().to_string(), source })?;
+        .map_err(|reason| runtime::StartError::Read { path: path.display().to_string(), reason })?;
     runtime::parse_config::<S::Config>(&entry.config, &text)?;
     Ok(())
 }

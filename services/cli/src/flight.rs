@@ -170,9 +170,7 @@ pub fn vehicle_body(manifest: &Manifest, root: &Path, cache: &Cache) -> Result<B
 /// # Errors
 /// When the sidecar is there and wrong.
 pub fn labels(manifest: &Manifest, root: &Path) -> Result<Vec<(String, f32, f32)>> {
-    let name = manifest.system.plan.replace(".yaml", ".rooms.yaml");
-    let Ok(bytes) = std::fs::read(root.join(&name)) else { return Ok(Vec::new()) };
-    let side = floorplan::Sidecar::parse(&name, &bytes)?;
+    let side = Start::new(manifest.system.clone(), root, 0, 0, true, Cache::default())?.sidecar()?;
     Ok(side
         .rooms
         .iter()

@@ -1,7 +1,7 @@
 //! Where the drone starts: the pad of the plan's sidecar file, or what the configuration says.
 
 use crate::StartSection;
-use floorplan::{Cell, Plan, Sidecar};
+use floorplan::{Cell, Plan};
 use runtime::{Start, StartError};
 
 /// A place and a heading in the plan frame.
@@ -12,12 +12,6 @@ pub(crate) struct Place {
     pub(crate) heading: f32,
 }
 
-/// Name of the sidecar file of a plan: `demo.yaml` has `demo.rooms.yaml`.
-fn sidecar_name(plan: &str) -> String {
-    let stem = plan.strip_suffix(".yaml").or_else(|| plan.strip_suffix(".yml")).unwrap_or(plan);
-    format!("{stem}.rooms.yaml")
-}
-
 pub(crate) fn place(config: &StartSection, start: &Start, plan: &Plan) -> Result<Place, StartError> {
     let from_config = match (config.x_m, config.y_m, config.heading_deg) {
         (Some(x), Some(y), Some(heading)) => Some(Place { x, y, heading: heading.to_radians() }),
@@ -26,9 +20,8 @@ pub(crate) fn place(config: &StartSection, start: &Start, plan: &Plan) -> Result
     let place = match from_config {
         Some(place) => place,
         None => {
-            let name = sidecar_name(&start.system.plan);
-            let sidecar = Sidecar::parse(&name, &start.read(&name)?).map_err(StartError::invalid)?;
-            let pad = sidecar.pad.ok_or_else(|| {
+            let name = start.sidecar_name();
+            let pad = start.sidecar()?.pad.ok_or_else(|| {
                 StartError::Invalid(format!(
                     "{name} names no pad; add `pad: {{x: ..., y: ..., heading_deg: ...}}`, or give start.x_m, \
                      start.y_m and start.heading_deg in the localization configuration"
@@ -46,14 +39,5 @@ pub(crate) fn place(config: &StartSection, start: &Start, plan: &Plan) -> Result
             if cell == Cell::Occupied { "inside a wall" } else { "outside the known area" },
             start.system.plan
         ))),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn the_sidecar_stands_beside_the_plan() {
-        assert_eq!(super::sidecar_name("plans/demo.yaml"), "plans/demo.rooms.yaml");
-        assert_eq!(super::sidecar_name("a.yml"), "a.rooms.yaml");
     }
 }

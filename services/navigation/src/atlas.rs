@@ -2,7 +2,7 @@
 
 use crate::track::SHORTEST_M;
 use floorplan::{DistanceField, Plan, Rooms, Sidecar};
-use patrol::{Costmap, Limits};
+use patrol::{Costmap, Limits, Progress, Round, Seen};
 use std::sync::Arc;
 
 /// Farther than this from what is not free counts as open, metres.
@@ -60,6 +60,31 @@ impl Atlas {
     #[must_use]
     pub fn map(&self) -> &Costmap {
         &self.map
+    }
+
+    /// Rooms that a round from the pad leaves out by the plan alone, with the reason; `None` when the drone could not
+    /// leave the pad at all. Works out a whole round: a second or two.
+    #[must_use]
+    pub fn left_out(&self) -> Option<Vec<(&str, String)>> {
+        let pad = self.pad?;
+        let seen = Seen::new(&self.map);
+        let mut round = Round::new(&self.map, self.rooms.len(), pad, pad, &seen);
+        loop {
+            match round.advance(&self.map, &seen, usize::MAX) {
+                Progress::Working => {}
+                Progress::Failed => return None,
+                Progress::Done => break,
+            }
+        }
+        let skipped = round.rooms().iter().enumerate().filter_map(|(room, plan)| Some((room, plan.skipped?)));
+        Some(
+            skipped
+                .map(|(room, obstacle)| {
+                    let name = self.rooms.name(room);
+                    (name, obstacle.reason(name, self.map.doors()))
+                })
+                .collect(),
+        )
     }
 
     /// The plan's hash as messages carry it.

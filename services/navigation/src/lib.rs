@@ -33,4 +33,4 @@ pub mod track;
 mod trim;
 mod words;
 
-pub use service::Navigation;
+pub use service::{Navigation, atlas_of};

@@ -5,9 +5,10 @@ use crate::config::NavigationConfig;
 use crate::core::Core;
 use crate::steer::Craft;
 use ::core::fmt::Write;
-use floorplan::{Rooms, Sidecar};
+use floorplan::Rooms;
 use ipc_types::{Command, Grid, Patrol, PilotState, Polar, Pose, Setpoint, SonarRanges, Text};
 use runtime::{ConfigError, Guard, Input, Output, Ports, Service, Start, StartError};
+use std::sync::Arc;
 
 /// The retained state of the round is said this often, nanoseconds: twice a second.
 const PATROL_NS: u64 = 500_000_000;
@@ -32,14 +33,20 @@ pub struct Navigation {
     resumed: bool,
 }
 
-/// The plan's side file: `demo.yaml` has `demo.rooms.yaml`; nothing is named without one.
-fn sidecar(start: &Start) -> Result<Sidecar, StartError> {
-    let plan = &start.system.plan;
-    let name = format!("{}.rooms.yaml", plan.strip_suffix(".yaml").unwrap_or(plan));
-    if !start.exists(&name) {
-        return Ok(Sidecar::default());
-    }
-    Sidecar::parse(&name, &start.read(&name)?).map_err(StartError::invalid)
+/// What navigation knows of the building, worked out once and shared between flights.
+///
+/// # Errors
+/// When plan or side file are missing or wrong.
+pub fn atlas_of(start: &Start) -> Result<Arc<Atlas>, StartError> {
+    let radius_m = start.vehicle.body.radius_m;
+    // Before the other: what is built for sharing may not ask for something shared.
+    let plan = start.plan()?;
+    // The radius is in the key: vehicles of one rehearsal may differ.
+    start.shared(&format!("navigation atlas {} {radius_m}", start.system.plan), || {
+        let sidecar = start.sidecar()?;
+        let rooms = Rooms::of(&start.system.plan, &sidecar, &plan).map_err(StartError::invalid)?;
+        Ok(Atlas::new(Arc::clone(&plan), rooms, &sidecar, radius_m))
+    })
 }
 
 impl Service for Navigation {
@@ -50,15 +57,7 @@ impl Service for Navigation {
         let vehicle = &start.vehicle;
         let cruise = if config.cruise_m_s > 0.0 { config.cruise_m_s } else { vehicle.limits.cruise_m_s };
         let craft = Craft { radius_m: vehicle.body.radius_m, cruise_m_s: cruise };
-        let plan = start.plan()?;
-        // The radius is in the key: vehicles of one rehearsal may differ.
-        let key = format!("navigation atlas {} {}", start.system.plan, craft.radius_m);
-        let atlas = start.shared(&key, || {
-            let sidecar = sidecar(start)?;
-            let rooms = Rooms::of(&start.system.plan, &sidecar, &plan).map_err(StartError::invalid)?;
-            Ok(Atlas::new(plan.clone(), rooms, &sidecar, craft.radius_m))
-        })?;
-        let core = Core::new(config, craft, atlas).map_err(|error| {
+        let core = Core::new(config, craft, atlas_of(start)?).map_err(|error| {
             ConfigError::range("radius_m", error, "a radius that avoidance can work with")
         })?;
         Ok(Self {

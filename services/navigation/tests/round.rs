@@ -234,6 +234,24 @@ fn a_round_sees_everything_and_ends_on_the_pad() {
 }
 
 #[test]
+fn what_cannot_be_reached_is_known_before_the_flight() {
+    let left_out = |rows: Vec<String>| {
+        let (_, sidecar) = building(&[], &[]);
+        let plan = floorplan::Plan::from_ascii(&rows.iter().map(String::as_str).collect::<Vec<_>>(), 0.1);
+        let rooms = Rooms::of("test", &sidecar, &plan).unwrap();
+        let atlas = Atlas::new(Arc::new(plan), rooms, &sidecar, common::RADIUS_M);
+        let found = atlas.left_out().unwrap();
+        found.into_iter().map(|(room, reason)| format!("{room}: {reason}")).collect::<Vec<_>>()
+    };
+    let (rows, _) = building(&[], &[]);
+    assert!(left_out(rows).is_empty());
+    // The two doors to North walled up on the plan itself.
+    let (rows, _) = building(&[1, 2], &[]);
+    let walled = rows.iter().map(|row| row.replace('o', "#")).collect();
+    assert_eq!(left_out(walled), ["North: no way to it on the plan"]);
+}
+
+#[test]
 fn a_shut_door_is_waited_for_then_gone_round() {
     let mut flight = Flight::new(&[0], &[]);
     flight.order(Verb::PatrolStart, f32::NAN, f32::NAN);

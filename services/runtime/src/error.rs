@@ -6,12 +6,12 @@ use crate::ConfigError;
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
     /// A file is missing or unreadable.
-    #[error("cannot read {path}: {source}")]
+    #[error("cannot read {path}: {reason}")]
     Read {
         /// The file.
         path: String,
-        /// What the system said.
-        source: std::io::Error,
+        /// What the system said. Part of the sentence, so no source of it.
+        reason: std::io::Error,
     },
     /// A configuration file is wrong.
     #[error(transparent)]

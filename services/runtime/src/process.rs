@@ -73,7 +73,7 @@ pub fn load_manifest(paths: &str) -> Result<(Manifest, PathBuf), StartError> {
     let mut loaded: Option<(Manifest, PathBuf)> = None;
     for path in paths.split(':').filter(|path| !path.is_empty()) {
         let text = std::fs::read_to_string(path)
-            .map_err(|source| StartError::Read { path: path.to_owned(), source })?;
+            .map_err(|reason| StartError::Read { path: path.to_owned(), reason })?;
         loaded = Some(match loaded {
             None => {
                 let root = Path::new(path).parent().unwrap_or(Path::new(".")).to_owned();
@@ -135,7 +135,7 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
     } else {
         let path = root.join(&entry.config);
         let text = std::fs::read_to_string(&path)
-            .map_err(|source| StartError::Read { path: path.display().to_string(), source })?;
+            .map_err(|reason| StartError::Read { path: path.display().to_string(), reason })?;
         config_hash = fnv(text.as_bytes());
         parse_config(&entry.config, &text)?
     };

@@ -1,7 +1,7 @@
 //! What a service is given when it starts.
 
 use crate::{StartError, fnv};
-use floorplan::Plan;
+use floorplan::{Plan, Sidecar};
 use manifest::{System, Vehicle};
 use std::any::Any;
 use std::cell::Cell;
@@ -20,7 +20,8 @@ impl std::fmt::Debug for Cache {
 }
 
 impl Cache {
-    /// The thing called `key`, built by `build` the first time.
+    /// The thing called `key`, built by `build` the first time. `build` may not ask the cache for anything: it would wait
+    /// for itself.
     ///
     /// # Errors
     /// Whatever `build` reports; nothing is kept then.
@@ -74,7 +75,7 @@ impl Start {
     ) -> Result<Self, StartError> {
         let path = resolve(root, &system.vehicle);
         let text = std::fs::read_to_string(&path)
-            .map_err(|source| StartError::Read { path: path.display().to_string(), source })?;
+            .map_err(|reason| StartError::Read { path: path.display().to_string(), reason })?;
         let vehicle = Vehicle::parse(&system.vehicle, &text).map_err(StartError::invalid)?;
         Ok(Self {
             seed,
@@ -94,7 +95,7 @@ impl Start {
     /// [`StartError::Read`] naming the file.
     pub fn read(&self, path: &str) -> Result<Vec<u8>, StartError> {
         let path = resolve(&self.root, path);
-        std::fs::read(&path).map_err(|source| StartError::Read { path: path.display().to_string(), source })
+        std::fs::read(&path).map_err(|reason| StartError::Read { path: path.display().to_string(), reason })
     }
 
     /// Whether a file is there.
@@ -118,6 +119,26 @@ impl Start {
         })?;
         self.plan_hash.set(plan.hash());
         Ok(plan)
+    }
+
+    /// Name of the plan's side file, which names pad, rooms and doors: `demo.yaml` has `demo.rooms.yaml`.
+    #[must_use]
+    pub fn sidecar_name(&self) -> String {
+        let plan = &self.system.plan;
+        let stem = plan.strip_suffix(".yaml").or_else(|| plan.strip_suffix(".yml")).unwrap_or(plan);
+        format!("{stem}.rooms.yaml")
+    }
+
+    /// The plan's side file; nothing is named without one.
+    ///
+    /// # Errors
+    /// When it is there and wrong.
+    pub fn sidecar(&self) -> Result<Sidecar, StartError> {
+        let name = self.sidecar_name();
+        if !self.exists(&name) {
+            return Ok(Sidecar::default());
+        }
+        Sidecar::parse(&name, &self.read(&name)?).map_err(StartError::invalid)
     }
 
     /// Something heavy and read-only, built once and shared between the flights of a rehearsal.

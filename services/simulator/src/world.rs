@@ -2,7 +2,6 @@
 
 use crate::Config;
 use airframe::world::{World, WorldFile};
-use floorplan::Sidecar;
 use runtime::{Start, StartError};
 
 /// The world that the simulator with this configuration and this start flies in: the same seed gives the
@@ -13,20 +12,9 @@ use runtime::{Start, StartError};
 /// Missing or wrong files, a blocked pad.
 pub fn build_world(config: &Config, start: &Start) -> Result<World, StartError> {
     let plan = start.plan()?;
-    let side = sidecar(start)?;
+    let side = start.sidecar()?;
     let file = world_file(start)?;
     World::build(&plan, &side, &file, config.clutter(), start.seed).map_err(StartError::invalid)
-}
-
-/// The plan's side file: `demo.yaml` has `demo.rooms.yaml`; nothing named without one.
-fn sidecar(start: &Start) -> Result<Sidecar, StartError> {
-    let plan = &start.system.plan;
-    let stem = plan.strip_suffix(".yaml").or_else(|| plan.strip_suffix(".yml")).unwrap_or(plan);
-    let name = format!("{stem}.rooms.yaml");
-    if !start.exists(&name) {
-        return Ok(Sidecar::default());
-    }
-    Sidecar::parse(&name, &start.read(&name)?).map_err(StartError::invalid)
 }
 
 fn world_file(start: &Start) -> Result<WorldFile, StartError> {

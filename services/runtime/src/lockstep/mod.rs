@@ -117,7 +117,7 @@ impl Lockstep {
         }
         let path = self.root.join(&entry.config);
         let text = std::fs::read_to_string(&path)
-            .map_err(|source| StartError::Read { path: path.display().to_string(), source })?;
+            .map_err(|reason| StartError::Read { path: path.display().to_string(), reason })?;
         Ok(parse_config(&entry.config, &text)?)
     }
 
