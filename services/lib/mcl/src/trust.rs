@@ -111,7 +111,7 @@ mod tests {
             (0..(seconds / 0.06) as usize).fold(0.005, |p, _| t.step(p, 0.06, 0.0, pair.into_iter()))
         };
         assert!(waited(4.0, [SHORT, SHORT]) < 0.05, "{}", waited(4.0, [SHORT, SHORT]));
-        assert!(waited(30.0, [HIT, SHORT]) < 0.005);
+        assert!(waited(30.0, [HIT, SHORT]) < 0.01);
         assert!(waited(20.0, [WRONG, WRONG]) > 0.9, "carried off, it notices all the same");
     }
 
