@@ -7,7 +7,9 @@ use crate::set::{MEMORY_GROUNDED, columns, columns_mut};
 use crate::sweep::Group;
 use crate::velocity::Frames;
 use floorplan::cast_cone;
-use mcl::{Generator, Memory, Motion, Sweep, wrap_angle};
+use ipc_types::Particles;
+use mcl::{Generator, Memory, Motion, Sweep, Update, wrap_angle};
+use runtime::Loan;
 
 /// Attitudes averaged before the first set is drawn: a quarter of a second at 30 Hz, enough for the whole
 /// degrees in which a controller gives its yaw.
@@ -51,16 +53,29 @@ impl Localization {
         self.level = self.grounded.then_some([start.level_roll, start.level_pitch]);
         let mut generator = Generator::new(self.seed);
         let update = self.filter.start_at(&start, columns_mut(&mut loan), &mut generator);
-        loan.estimated_ns = now;
+        self.believed = Some(self.send(now, now, &update, &generator, loan));
+    }
+
+    /// Sends a set that was written for `time_ns`.
+    fn send(
+        &mut self,
+        now: u64,
+        time_ns: u64,
+        update: &Update,
+        generator: &Generator,
+        mut loan: Loan<Particles>,
+    ) -> Believed {
+        loan.estimated_ns = time_ns;
         loan.updates = self.sent + 1;
         loan.generator = generator.state();
-        loan.memory = self.remember(&update.memory);
+        loan.memory = update.memory.to_array();
+        loan.memory[MEMORY_GROUNDED] = if self.grounded { 1.0 } else { 0.0 };
         loan.count = update.count as u32;
         loan.plan = self.plan;
         loan.send();
         self.sent += 1;
         self.sent_ns = now;
-        self.believed = Some(Believed { time_ns: now, estimate: update.estimate, count: update.count });
+        Believed { time_ns, estimate: update.estimate, count: update.count }
     }
 
     /// Reads the last set, writes the next for `time_ns` into a fresh loan and sends it.
@@ -112,16 +127,7 @@ impl Localization {
         if let Some(group) = group {
             self.walls.take(&group.sensors[..group.count], update.fits, time_ns);
         }
-        loan.estimated_ns = time_ns;
-        loan.updates = self.sent + 1;
-        loan.generator = generator.state();
-        loan.memory = self.remember(&update.memory);
-        loan.count = update.count as u32;
-        loan.plan = self.plan;
-        loan.send();
-        self.sent += 1;
-        self.sent_ns = now;
-        let believed = Believed { time_ns, estimate: update.estimate, count: update.count };
+        let believed = self.send(now, time_ns, &update, &generator, loan);
         let (e, frames) = (&believed.estimate, self.frames(&believed));
         if let Some(group) = group {
             let (place, velocity) = ([e.x, e.y], [e.velocity_x, e.velocity_y]);
@@ -150,12 +156,6 @@ impl Localization {
             velocity_y: -sin * x + cos * y,
             sigma: (swept.sigma * (SWEPT_S / dt_s).sqrt()).max(LEAST_SWEPT_M_S),
         })
-    }
-
-    fn remember(&self, memory: &Memory) -> [f32; 16] {
-        let mut out = memory.to_array();
-        out[MEMORY_GROUNDED] = if self.grounded { 1.0 } else { 0.0 };
-        out
     }
 
     pub(super) fn frames(&self, b: &Believed) -> Frames {
