@@ -1,5 +1,6 @@
 //! One update of the particle set.
 
+use crate::beams::Beams;
 use crate::config::{Config, ConfigError};
 use crate::estimate::{Estimate, Summary};
 use crate::generator::{Generator, Lanes};
@@ -8,7 +9,7 @@ use crate::maths::sum;
 use crate::motion::{Motion, NOISE_ROWS, Step};
 use crate::particles::{ParticlesMut, ParticlesRef};
 use crate::resample::draw_ancestors;
-use crate::sonar::{Beams, Echo, Sweep};
+use crate::sonar::{Echo, Sweep};
 
 /// Particles are worked on in blocks of this many, so that what passes between the steps stays in the
 /// first-level cache.

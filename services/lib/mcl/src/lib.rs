@@ -20,6 +20,7 @@
 //! * **4** (normalisation) as it stands.
 #![forbid(unsafe_code)]
 
+mod beams;
 mod config;
 mod estimate;
 mod filter;
