@@ -7,6 +7,7 @@
 mod attitude;
 mod config;
 mod flow;
+mod kalman;
 mod news;
 mod pose;
 mod predict;

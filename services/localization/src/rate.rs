@@ -76,8 +76,9 @@ impl Velocity {
         self.advance(time_ns, attitudes, frames);
         // Flow may have carried the state past the ping.
         let late = seconds(time_ns, self.time_ns).max(0.0) as f32;
-        let way = [0, 1].map(|axis| self.way[axis] - late * self.state[axis][1]);
-        let here = [0, 1].map(|axis| self.state[axis][0] - late * self.state[axis][1]);
+        let (place, speed) = (self.place_now(), self.velocity_now());
+        let way = [0, 1].map(|axis| self.way[axis] - late * speed[axis]);
+        let here = [0, 1].map(|axis| place[axis] - late * speed[axis]);
         let heading = attitudes.at(time_ns).unwrap_or_default().yaw + frames.heading_offset;
         let from = |place: [f32; 2], heading: f32| {
             let (sin, cos) = heading.sin_cos();
@@ -107,13 +108,13 @@ impl Velocity {
         };
         let thing = || {
             let (sin, cos) = (heading + ranged.bearing).sin_cos();
-            let slant = THING_M_S.hypot(SLANT * self.state[0][1].hypot(self.state[1][1]));
+            let slant = THING_M_S.hypot(SLANT * speed[0].hypot(speed[1]));
             let turned = mcl::wrap_angle(heading - last.heading).abs();
             let answers = turned < TURNED_RAD && ranged.range > NEAREST_M && last.range > NEAREST_M;
             answers.then_some(([-cos, -sin], change + cos * gone[0] + sin * gone[1], slant))
         };
         let Some((normal, error, slant)) = wall().or_else(thing) else { return };
-        let unsure = [0, 1].map(|axis| self.variance[2 * axis][1][1]).iter().sum::<f32>().max(0.0).sqrt();
+        let unsure = self.velocity_variance().iter().sum::<f32>().sqrt();
         // Another surface, somebody before it, somebody who walks: too much of a change.
         if error.abs() > RANGE_GATE_M + 2.0 * unsure * apart {
             return;
@@ -122,7 +123,7 @@ impl Velocity {
         let miss = error / apart;
         let spread = sigma * sigma + unsure * unsure;
         let sigma = sigma * (1.0 + RANGE_TAIL * miss * miss / spread).sqrt();
-        self.measure(1, normal, 0.0, miss, sigma);
+        self.measure(normal, miss, sigma);
     }
 }
 
@@ -138,17 +139,17 @@ mod tests {
         let expected = |x: f32, _: f32, angle: f32| (angle.cos() > 0.9).then_some(3.0 - x);
         let ranged = |t: f32| Ranged { sensor: 0, range: 3.04 - 0.3 * t, mount: [0.06, 0.0], bearing: 0.1 };
         let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.0; 2]);
+        velocity.begin(100 * MS, [0.0; 2], [0.0; 2], [0.0; 2]);
         for i in 0..6u64 {
             let time_ns = (100 + 240 * i) * MS;
             velocity.range(time_ns, &ranged(0.24 * i as f32), &attitudes, &frames, expected);
             if i == 2 {
-                assert!((velocity.state[0][1] - 0.3).abs() < 0.05, "{:?}", velocity.state);
+                assert!((velocity.velocity_now()[0] - 0.3).abs() < 0.05, "{:?}", velocity.velocity_now());
             }
         }
         let [vx, vy] = velocity.at(1300 * MS, &attitudes, &frames).unwrap().velocity;
         assert!((vx - 0.3).abs() < 0.03 && vy.abs() < 1e-3, "{vx} {vy}");
-        assert!(velocity.variance[0][1][1] < 0.5 * velocity.variance[2][1][1], "{:?}", velocity.variance);
+        assert!(velocity.velocity_variance()[0] < 0.5 * velocity.velocity_variance()[1], "{:?}", velocity.velocity_variance());
     }
 
     #[test]
@@ -156,16 +157,16 @@ mod tests {
         let (attitudes, frames) = (level(), Frames::default());
         let expected = |x: f32, _: f32, angle: f32| (angle.cos() > 0.9).then_some(3.0 - x);
         let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.0; 2]);
+        velocity.begin(100 * MS, [0.0; 2], [0.0; 2], [0.0; 2]);
         let mut most = 0.0f32;
         for i in 0..20u64 {
             let t = 0.06 * i as f32;
             let ranged =
                 Ranged { sensor: (i % 4) as u8, range: 3.0 - 0.3 * t, mount: [0.0; 2], bearing: 0.0 };
             velocity.range((100 + 60 * i) * MS, &ranged, &attitudes, &frames, expected);
-            most = most.max(velocity.state[0][1]);
+            most = most.max(velocity.velocity_now()[0]);
         }
-        assert!((velocity.state[0][1] - 0.3).abs() < 0.02 && most < 0.33, "{most} {:?}", velocity.state);
+        assert!((velocity.velocity_now()[0] - 0.3).abs() < 0.02 && most < 0.33, "{most} {:?}", velocity.velocity_now());
     }
 
     #[test]
@@ -173,11 +174,11 @@ mod tests {
         let (attitudes, frames) = (level(), Frames::default());
         let expected = |x: f32, _: f32, _: f32| Some(3.0 - x);
         let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.0; 2]);
+        velocity.begin(100 * MS, [0.0; 2], [0.0; 2], [0.0; 2]);
         for (i, range) in [3.0, 3.0, 2.8, 2.3, 3.0, 3.0].into_iter().enumerate() {
             let ranged = Ranged { sensor: 0, range, mount: [0.0; 2], bearing: 0.0 };
             velocity.range((100 + 240 * i as u64) * MS, &ranged, &attitudes, &frames, expected);
-            assert!(velocity.state[0][1].abs() < 0.02, "{i}: {:?}", velocity.state);
+            assert!(velocity.velocity_now()[0].abs() < 0.02, "{i}: {:?}", velocity.velocity_now());
         }
     }
 
@@ -186,7 +187,7 @@ mod tests {
         // 0.3 m/s towards somebody who is on no plan, over a floor that shows nothing.
         let (attitudes, frames) = (level(), Frames::default());
         let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.0; 2]);
+        velocity.begin(100 * MS, [0.0; 2], [0.0; 2], [0.0; 2]);
         for i in 0..6u64 {
             let range = 1.2 - 0.3 * 0.24 * i as f32;
             let ranged = Ranged { sensor: 0, range, mount: [0.06, 0.0], bearing: 0.0 };
@@ -202,12 +203,12 @@ mod tests {
         let (attitudes, frames) = (level(), Frames::default());
         let believed = |range: f32| {
             let mut velocity = Velocity::default();
-            velocity.begin(100 * MS, [0.0; 2], [0.3, 0.0]);
+            velocity.begin(100 * MS, [0.0; 2], [0.3, 0.0], [0.0; 2]);
             for i in 0..5u64 {
                 let ranged = Ranged { sensor: 0, range, mount: [0.06, 0.0], bearing: 0.0 };
                 velocity.range((100 + 240 * i) * MS, &ranged, &attitudes, &frames, |_, _, _| None);
             }
-            velocity.state[0][1]
+            velocity.velocity_now()[0]
         };
         assert!((believed(0.05) - 0.3).abs() < 1e-3, "{}", believed(0.05));
         assert!(believed(0.5) < 0.1, "what stands there and comes no nearer is believed: {}", believed(0.5));

@@ -60,9 +60,6 @@ pub struct Localization {
     sent_ns: u64,
     grounded: bool,
     believed: Option<Believed>,
-    /// What the attitude reads (roll, pitch) when the body is level, as it stood on the ground; after a restart in the air
-    /// as it is believed then. It stays: a level that follows the filter would lead it.
-    level: Option<[f32; 2]>,
     next_pose_ns: u64,
     refused: u64,
 }
@@ -118,7 +115,6 @@ impl Service for Localization {
             sent_ns: 0,
             grounded: true,
             believed: None,
-            level: None,
             next_pose_ns: 0,
             refused: 0,
         };

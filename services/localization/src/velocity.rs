@@ -11,6 +11,7 @@
 
 use crate::attitude::{Attitudes, Tilt, seconds};
 use crate::flow::Frame;
+use crate::kalman::Kalman;
 use crate::rate::{LONGEST_S, Ping};
 use ipc_types::MAX_SONARS;
 
@@ -21,19 +22,33 @@ const SILENT_S: f64 = 0.3;
 /// Standard deviation of one place of the particles, metres: they err by 3 cm, and for so long that each counts for a
 /// tenth of what it would alone.
 const PLACE_M: f32 = 0.1;
+/// Standard deviation of the velocity that it begins with, and of one that stands on the ground, m/s.
+const BEGIN_M_S: f32 = 0.2;
+const STANDING_M_S: f32 = 0.02;
+/// No attitude errs by more, radians: six degrees are a quarter of a second of the strongest acceleration.
+const LARGEST_LEVEL: f32 = 0.1;
 /// A place farther off is a jump of the particles: begun anew, metres.
 const JUMP_M: f32 = 0.6;
 /// Rms of the air's acceleration, m/s², and the time in which it changes, seconds: FACTS 8 has 0.2 of gusts, more
 /// near walls; the rest and the longer time make room for an error of level.
-const GUST_M_S2: f32 = 0.3;
-const GUST_S: f32 = 1.0;
-/// The same where the accelerometer feels the gust: what is left are errors of the attitude, a third of a degree.
-const UNFELT_M_S2: f32 = 0.12;
-const UNFELT_S: f32 = 2.0;
+const GUST_M_S2: f64 = 0.3;
+const GUST_S: f64 = 1.0;
+/// Where the accelerometer feels the gust, what is left is the error of the attitude. The controller turns its vertical
+/// towards what its accelerometer feels at this rate, 1/s: 0.25 by default in Betaflight (`imu_dcm_kp`), 0.2 in INAV.
+const PULL_PER_S: f64 = 0.25;
+/// What is left on the ground, where the vertical has settled, and after a restart in the air, m/s²; and its random walk,
+/// m/s² per √s: the gyro's bias and noise, and a pull that is another than the one above.
+const SETTLED_M_S2: f32 = 0.03;
+const UNSETTLED_M_S2: f32 = 0.15;
+const ERROR_WALK: f64 = 0.015;
+/// How far the accelerometer's own error is from the level that is read on the ground, m/s² (half a degree: the rest
+/// turns along with the gyro), and its random walk, m/s² per √s.
+const LEVEL_M_S2: f32 = 0.09;
+const LEVEL_WALK: f64 = 0.002;
 /// Random walk of the velocity where the accelerometer feels the gust: its vibration, 30 readings a second.
-const FELT_WALK: f32 = 0.04;
+const FELT_WALK: f64 = 0.04;
 /// Random walk of the velocity beside the gust, m/s per √s: tilt is read to a tenth of a degree, 30 times a second.
-const WALK: f32 = 0.1;
+const WALK: f64 = 0.1;
 /// How fast the weight of a surprising measurement falls, like Student's t: flow errs when the body turns fast.
 const FLOW_TAIL: f32 = 0.1;
 /// m/s².
@@ -44,7 +59,7 @@ const GRAVITY: f32 = 9.806_65;
 const SHARE: f32 = 0.65;
 const SHARE_SIGMA: f32 = 0.25;
 const SHARE_LEAST: f32 = 0.2;
-const SHARE_WALK: f32 = 0.05;
+const SHARE_WALK: f64 = 0.05;
 
 /// What turns an attitude into an acceleration in the plan frame.
 #[derive(Clone, Copy, Debug, Default)]
@@ -68,23 +83,26 @@ pub(crate) struct Swept {
     pub(crate) air: [f32; 2],
 }
 
-/// A 3 by 3 block of the covariance.
-pub(crate) type Block = [[f32; 3]; 3];
+/// Along x of the plan: place, velocity, and the acceleration that attitude and accelerometer do not tell of. The same
+/// along y stands [`Y`] further on.
+const PLACE: usize = 0;
+const SPEED: usize = 1;
+const UNTOLD: usize = 2;
+const Y: usize = 3;
+/// The accelerometer's own error forward and left, body frame.
+const LEVEL: usize = 6;
+/// Share of the motion that the flow sensor tells apart over the poor floor below.
+const SHARE_AT: usize = 8;
+const STATES: usize = 9;
 
-/// A Kalman filter on place, velocity and gust along both axes of the plan.
+/// A Kalman filter on place, velocity and what is not felt, along both axes of the plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Velocity {
     /// Time of the state; zero: none.
     pub(crate) time_ns: u64,
-    /// Place, velocity and gust along x and y, plan frame.
-    pub(crate) state: [[f32; 3]; 2],
-    /// Covariance of x with x, x with y, y with y.
-    pub(crate) variance: [Block; 3],
-    /// Share of the motion that the flow sensor tells apart over the poor floor below, its variance and its
-    /// covariance with the state.
-    share: f32,
-    share_variance: f32,
-    share_with: [[f32; 3]; 2],
+    filter: Kalman<STATES>,
+    /// The yaw that the state has followed to; `None` before the first.
+    yaw: Option<f32>,
     /// The velocity, summed up: unlike the place nothing corrects it.
     pub(crate) way: [f32; 2],
     /// The last echo of each sensor.
@@ -92,18 +110,74 @@ pub(crate) struct Velocity {
 }
 
 impl Velocity {
-    /// Begins at a place with a velocity.
-    pub(crate) fn begin(&mut self, time_ns: u64, place: [f32; 2], velocity: [f32; 2]) {
-        let gust = GUST_M_S2 * GUST_M_S2;
-        let own = [[PLACE_M * PLACE_M, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, gust]];
-        *self = Self {
-            time_ns,
-            state: [[place[0], velocity[0], 0.0], [place[1], velocity[1], 0.0]],
-            variance: [own, [[0.0; 3]; 3], own],
-            share: SHARE,
-            share_variance: SHARE_SIGMA * SHARE_SIGMA,
-            ..Self::default()
-        };
+    /// Begins at a place with a velocity. What is known of the attitude's error is kept; before anything is, `level` is
+    /// what it reads (roll, pitch) of an upright body.
+    pub(crate) fn begin(&mut self, time_ns: u64, place: [f32; 2], velocity: [f32; 2], level: [f32; 2]) {
+        if self.time_ns == 0 {
+            self.settle(level, UNSETTLED_M_S2);
+        }
+        for axis in 0..2 {
+            self.filter.set(PLACE + Y * axis, place[axis], PLACE_M);
+            self.filter.set(SPEED + Y * axis, velocity[axis], BEGIN_M_S);
+        }
+        self.forget_share();
+        (self.time_ns, self.pings) = (time_ns, Default::default());
+    }
+
+    /// Stands on the ground, where the vertical is that of the accelerometer.
+    pub(crate) fn stand(&mut self, time_ns: u64, place: [f32; 2], level: [f32; 2]) {
+        self.begin(time_ns, place, [0.0; 2], level);
+        for axis in 0..2 {
+            self.filter.set(SPEED + Y * axis, 0.0, STANDING_M_S);
+        }
+        self.settle(level, SETTLED_M_S2);
+        self.yaw = None;
+    }
+
+    fn settle(&mut self, level: [f32; 2], untold: f32) {
+        for (axis, error) in tilted(&Tilt::default(), level).into_iter().enumerate() {
+            self.filter.set(UNTOLD + Y * axis, 0.0, untold);
+            self.filter.set(LEVEL + axis, -error, LEVEL_M_S2);
+        }
+    }
+
+    /// What was learned of a poor floor is forgotten.
+    fn forget_share(&mut self) {
+        self.filter.set(SHARE_AT, SHARE, SHARE_SIGMA);
+    }
+
+    /// Plan frame, metres.
+    pub(crate) fn place_now(&self) -> [f32; 2] {
+        [0, 1].map(|axis| self.filter.state[PLACE + Y * axis] as f32)
+    }
+
+    /// Plan frame, m/s.
+    pub(crate) fn velocity_now(&self) -> [f32; 2] {
+        [0, 1].map(|axis| self.filter.state[SPEED + Y * axis] as f32)
+    }
+
+    /// Of each component of the velocity.
+    pub(crate) fn velocity_variance(&self) -> [f32; 2] {
+        [0, 1].map(|axis| self.filter.variance[SPEED + Y * axis][SPEED + Y * axis].max(0.0) as f32)
+    }
+
+    /// What the accelerometer feels of gravity in a body that stands upright, forward and left, with the sign turned, m/s².
+    pub(crate) fn accelerometer_error(&self) -> [f32; 2] {
+        [0, 1].map(|axis| self.filter.state[LEVEL + axis] as f32)
+    }
+
+    /// What the attitude reads (roll, pitch) now when the body is upright, radians; `frames` has it where no accelerometer
+    /// is heard.
+    pub(crate) fn upright(&self, attitudes: &Attitudes, frames: &Frames) -> [f32; 2] {
+        let Some((_, tilt)) = attitudes.newest().filter(|_| self.time_ns > 0) else { return frames.level };
+        if !tilt.force.iter().all(|axis| axis.is_finite()) {
+            return frames.level;
+        }
+        let (sin, cos) = (self.yaw.unwrap_or(tilt.yaw) + frames.heading_offset).sin_cos();
+        let [x, y] = [0, 1].map(|axis| self.filter.state[UNTOLD + Y * axis] as f32);
+        let [forward, left] = self.accelerometer_error();
+        let read = [forward - cos * x - sin * y, left + sin * x - cos * y].map(|a| (a / GRAVITY).atan());
+        [-read[1], read[0]].map(|angle| angle.clamp(-LARGEST_LEVEL, LARGEST_LEVEL))
     }
 
     pub(crate) fn is_known(&self, time_ns: u64) -> bool {
@@ -118,15 +192,14 @@ impl Velocity {
         self.advance(frame.time_ns, attitudes, frames);
         let [x, y] = in_plan(frame, attitudes, frames);
         // A frame from before the state's time is a little old; the gust since then is not worth a replay.
-        let miss = [x - self.state[0][1], y - self.state[1][1]];
-        let spread = frame.sigma * frame.sigma + self.variance[0][1][1].max(self.variance[2][1][1]);
+        let [vx, vy] = self.velocity_now();
+        let miss = [x - vx, y - vy];
+        let [of_x, of_y] = self.velocity_variance();
+        let spread = frame.sigma * frame.sigma + of_x.max(of_y);
         let sigma = frame.sigma * (1.0 + FLOW_TAIL * (miss[0] * miss[0] + miss[1] * miss[1]) / spread).sqrt();
-        // The floor is another one: what was learned of a poor one is forgotten.
-        self.share = SHARE;
-        self.share_variance = SHARE_SIGMA * SHARE_SIGMA;
-        self.share_with = [[0.0; 3]; 2];
-        self.measure(1, [1.0, 0.0], 0.0, miss[0], sigma);
-        self.measure(1, [0.0, 1.0], 0.0, miss[1], sigma);
+        self.forget_share();
+        self.measure([1.0, 0.0], miss[0], sigma);
+        self.measure([0.0, 1.0], miss[1], sigma);
     }
 
     /// Takes a flow frame from over a poor floor: it shows an unknown share of the velocity. While the velocity
@@ -137,11 +210,12 @@ impl Velocity {
         }
         self.advance(frame.time_ns, attitudes, frames);
         for (axis, shown) in in_plan(frame, attitudes, frames).into_iter().enumerate() {
-            let velocity = self.state[axis][1];
-            let mut along = [0.0; 2];
-            along[axis] = self.share;
-            self.measure(1, along, velocity, shown - self.share * velocity, frame.sigma);
-            self.share = self.share.clamp(SHARE_LEAST, 1.0);
+            let (velocity, share) = (self.filter.state[SPEED + Y * axis], self.filter.state[SHARE_AT]);
+            let mut along = [0.0; STATES];
+            (along[SPEED + Y * axis], along[SHARE_AT]) = (share, velocity);
+            self.take(&along, shown - (share * velocity) as f32, frame.sigma);
+            let share = &mut self.filter.state[SHARE_AT];
+            *share = share.clamp(f64::from(SHARE_LEAST), 1.0);
         }
     }
 
@@ -161,58 +235,35 @@ impl Velocity {
         if known {
             self.advance(time_ns, attitudes, frames);
         }
-        let off = [0, 1].map(|axis| place[axis] + late * self.state[axis][1] - self.state[axis][0]);
+        let (here, speed) = (self.place_now(), self.velocity_now());
+        let off = [0, 1].map(|axis| place[axis] + late * speed[axis] - here[axis]);
         let far = off[0].hypot(off[1]);
         if !known || far.is_nan() || far > JUMP_M {
-            self.begin(time_ns, place, velocity);
-        } else {
-            self.measure(0, [1.0, 0.0], 0.0, off[0], PLACE_M.hypot(spread[0]));
-            self.measure(0, [0.0, 1.0], 0.0, off[1], PLACE_M.hypot(spread[1]));
+            self.begin(time_ns, place, velocity, frames.level);
+            return;
+        }
+        for axis in 0..2 {
+            let mut along = [0.0; STATES];
+            along[PLACE + Y * axis] = 1.0;
+            self.take(&along, off[axis], PLACE_M.hypot(spread[axis]));
         }
     }
 
-    /// Takes a measurement along a direction of one part of the state (and of the share): what it misses the
-    /// state by.
-    pub(crate) fn measure(&mut self, part: usize, along: [f32; 2], of_share: f32, miss: f32, sigma: f32) {
-        let [xx, xy, yy] = &self.variance;
-        let [x, y] = &self.share_with;
-        let column: [[f32; 3]; 2] = [
-            core::array::from_fn(|i| xx[i][part] * along[0] + xy[i][part] * along[1] + x[i] * of_share),
-            core::array::from_fn(|i| xy[part][i] * along[0] + yy[i][part] * along[1] + y[i] * of_share),
-        ];
-        let share = x[part] * along[0] + y[part] * along[1] + self.share_variance * of_share;
-        let noise =
-            column[0][part] * along[0] + column[1][part] * along[1] + share * of_share + sigma * sigma;
-        if !(noise > 0.0 && miss.is_finite()) {
-            return;
-        }
-        let gain = column.map(|axis| axis.map(|c| c / noise));
-        for (state, gain) in self.state.iter_mut().zip(gain) {
-            for (value, gain) in state.iter_mut().zip(gain) {
-                *value += gain * miss;
-            }
-        }
-        for (block, (a, b)) in self.variance.iter_mut().zip([(0, 0), (0, 1), (1, 1)]) {
-            for (row, gain) in block.iter_mut().zip(gain[a]) {
-                for (value, of_part) in row.iter_mut().zip(column[b]) {
-                    *value -= gain * of_part;
-                }
-            }
-        }
-        self.share += share / noise * miss;
-        for (with, gain) in self.share_with.iter_mut().zip(gain) {
-            for (value, gain) in with.iter_mut().zip(gain) {
-                *value -= gain * share;
-            }
-        }
-        self.share_variance -= share * share / noise;
+    /// Takes a measurement of the velocity along a direction of the plan: what it misses the state by.
+    pub(crate) fn measure(&mut self, along: [f32; 2], miss: f32, sigma: f32) {
+        let mut of_state = [0.0; STATES];
+        (of_state[SPEED], of_state[SPEED + Y]) = (along[0].into(), along[1].into());
+        self.take(&of_state, miss, sigma);
+    }
+
+    fn take(&mut self, along: &[f64; STATES], miss: f32, sigma: f32) {
+        let Some(moved) = self.filter.measure(along, miss, sigma) else { return };
         // The error that was just found stood since before the last pings: the way since then was another.
         let time_ns = self.time_ns;
         for ping in self.pings.iter_mut().filter(|ping| ping.time_ns > 0) {
             let age = seconds(ping.time_ns, time_ns).clamp(0.0, f64::from(LONGEST_S)) as f32;
-            for (way, gain) in ping.way.iter_mut().zip(gain) {
-                *way -= gain[1] * miss * age;
-            }
+            ping.way[0] -= moved[SPEED] as f32 * age;
+            ping.way[1] -= moved[SPEED + Y] as f32 * age;
         }
     }
 
@@ -224,12 +275,12 @@ impl Velocity {
         }
         let mut then = self.clone();
         then.advance(time_ns, attitudes, frames);
-        let velocity = [then.state[0][1], then.state[1][1]];
-        let variance = then.variance[0][1][1].max(then.variance[2][1][1]).max(0.0);
+        let velocity = then.velocity_now();
+        let [of_x, of_y] = then.velocity_variance();
         let air = then.air(time_ns, attitudes, frames);
         velocity.iter().chain(&air).all(|v| v.is_finite()).then(|| Swept {
             velocity,
-            sigma: variance.sqrt(),
+            sigma: of_x.max(of_y).sqrt(),
             air,
         })
     }
@@ -237,7 +288,7 @@ impl Velocity {
     /// What accelerates the body beside its tilt and its drag, plan frame, m/s².
     fn air(&self, time_ns: u64, attitudes: &Attitudes, frames: &Frames) -> [f32; 2] {
         let tilt = attitudes.at(time_ns).unwrap_or_default();
-        let unfelt = [self.state[0][2], self.state[1][2]];
+        let unfelt = [0, 1].map(|axis| self.filter.state[UNTOLD + Y * axis] as f32);
         if !tilt.force.iter().all(|axis| axis.is_finite()) {
             return unfelt;
         }
@@ -245,7 +296,7 @@ impl Velocity {
         let (read, upright) = (tilted(&tilt, [0.0; 2]), tilted(&tilt, frames.level));
         let [forward, left] = [0, 1].map(|axis| read[axis] - upright[axis] + tilt.force[axis]);
         let felt = [cos * forward - sin * left, sin * forward + cos * left];
-        [0, 1].map(|axis| felt[axis] + unfelt[axis] + frames.drag * self.state[axis][1])
+        [0, 1].map(|axis| felt[axis] + unfelt[axis] + frames.drag * self.velocity_now()[axis])
     }
 
     pub(crate) fn advance(&mut self, to_ns: u64, attitudes: &Attitudes, frames: &Frames) {
@@ -265,32 +316,49 @@ impl Velocity {
                 tilted(&tilt, frames.level)
             };
             let tilted = [cos * forward - sin * left, sin * forward + cos * left];
-            let h = h as f32;
-            let (gust_m_s2, gust_s, walk, drag) = if felt {
-                (UNFELT_M_S2, UNFELT_S, FELT_WALK, 0.0)
+            let (spread, walk, drag, keep, pull) = if felt {
+                (ERROR_WALK * ERROR_WALK, FELT_WALK, 0.0, 1.0, PULL_PER_S * h)
             } else {
-                (GUST_M_S2, GUST_S, WALK, frames.drag)
+                let spread = 2.0 * GUST_M_S2 * GUST_M_S2 / GUST_S;
+                (spread, WALK, f64::from(frames.drag), 1.0 - h / GUST_S, 0.0)
             };
-            let (keep, slow) = (1.0 - h / gust_s, 1.0 - drag * h);
-            for (([place, velocity, gust], way), tilted) in
-                self.state.iter_mut().zip(&mut self.way).zip(tilted)
-            {
-                *place += *velocity * h;
-                *way += *velocity * h;
-                *velocity = slow * *velocity + (tilted + *gust) * h;
-                *gust *= keep;
+            // The vertical keeps its error in the plan while the body turns; the accelerometer takes its own along.
+            let before = (self.yaw.replace(tilt.yaw).unwrap_or(tilt.yaw) + frames.heading_offset).sin_cos();
+            let (more_sin, more_cos) = if felt { (sin - before.0, cos - before.1) } else { (0.0, 0.0) };
+            let slow = 1.0 - drag * h;
+            let [forward, left] = self.accelerometer_error();
+            let turned = [more_cos * forward - more_sin * left, more_sin * forward + more_cos * left];
+            let mut motion = [[0.0; STATES]; STATES];
+            for (i, row) in motion.iter_mut().enumerate() {
+                row[i] = 1.0;
             }
-            let forward = [[1.0, h, 0.0], [0.0, slow, h], [0.0, 0.0, keep]];
-            for with in &mut self.share_with {
-                *with = core::array::from_fn(|i| (0..3).map(|k| forward[i][k] * with[k]).sum());
+            for axis in 0..2 {
+                let [place, speed, untold] = [PLACE, SPEED, UNTOLD].map(|i| i + Y * axis);
+                let state = &mut self.filter.state;
+                let felt = f64::from(tilted[axis]);
+                self.way[axis] += (state[speed] * h) as f32;
+                state[place] += state[speed] * h;
+                state[speed] = slow * state[speed] + (felt + state[untold]) * h;
+                state[untold] = keep * state[untold] + pull * felt + f64::from(turned[axis]);
+                motion[place][speed] = h;
+                (motion[speed][speed], motion[speed][untold]) = (slow, h);
+                motion[untold][untold] = keep;
             }
-            self.share_variance += SHARE_WALK * SHARE_WALK * h;
-            for (block, own) in self.variance.iter_mut().zip([true, false, true]) {
-                *block = carried(&forward, block);
-                if own {
-                    block[1][1] += walk * walk * h;
-                    block[2][2] += 2.0 * gust_m_s2 * gust_m_s2 / gust_s * h;
-                }
+            let (more_sin, more_cos) = (f64::from(more_sin), f64::from(more_cos));
+            (motion[UNTOLD][LEVEL], motion[UNTOLD][LEVEL + 1]) = (more_cos, -more_sin);
+            (motion[UNTOLD + Y][LEVEL], motion[UNTOLD + Y][LEVEL + 1]) = (more_sin, more_cos);
+            self.filter.carry(&motion);
+            let noises = [
+                (SPEED, walk * walk),
+                (SPEED + Y, walk * walk),
+                (UNTOLD, spread),
+                (UNTOLD + Y, spread),
+                (LEVEL, LEVEL_WALK * LEVEL_WALK),
+                (LEVEL + 1, LEVEL_WALK * LEVEL_WALK),
+                (SHARE_AT, SHARE_WALK * SHARE_WALK),
+            ];
+            for (i, noise) in noises {
+                self.filter.variance[i][i] += noise * h;
             }
         }
         self.time_ns = to_ns.max(self.time_ns);
@@ -309,15 +377,6 @@ fn in_plan(frame: &Frame, attitudes: &Attitudes, frames: &Frames) -> [f32; 2] {
     let (sin, cos) = yaw.sin_cos();
     let [x, y] = frame.velocity;
     [cos * x - sin * y, sin * x + cos * y]
-}
-
-/// F P F'.
-fn carried(f: &Block, p: &Block) -> Block {
-    let product = |a: &Block, b: &dyn Fn(usize, usize) -> f32| -> Block {
-        core::array::from_fn(|i| core::array::from_fn(|j| (0..3).map(|k| a[i][k] * b(k, j)).sum()))
-    };
-    let half = product(f, &|k, j| p[k][j]);
-    product(&half, &|k, j| f[j][k])
 }
 
 #[cfg(test)]
@@ -339,7 +398,7 @@ pub(crate) mod tests {
         // 0.5 m/s² from a level body: tilt alone would see nothing.
         let (attitudes, frames) = (level(), Frames::default());
         let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.0; 2]);
+        velocity.begin(100 * MS, [0.0; 2], [0.0; 2], [0.0; 2]);
         for i in 0..30u64 {
             let time_ns = (100 + 40 * i) * MS;
             let frame = Frame { time_ns, velocity: [0.5 * 0.04 * i as f32, 0.0], sigma: 0.07 };
@@ -357,7 +416,7 @@ pub(crate) mod tests {
         // 0.4 m/s that neither tilt nor flow tell of.
         let (attitudes, frames) = (level(), Frames::default());
         let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.0; 2]);
+        velocity.begin(100 * MS, [0.0; 2], [0.0; 2], [0.0; 2]);
         for i in 1..=20u64 {
             let place = [0.4 * 0.06 * i as f32, 1.0];
             velocity.place((100 + 60 * i) * MS, place, [0.0; 2], [0.0; 2], &attitudes, &frames);
@@ -377,7 +436,7 @@ pub(crate) mod tests {
         // quarters of the speed away.
         let (attitudes, frames) = (level(), Frames::default());
         let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.4, 0.0]);
+        velocity.begin(100 * MS, [0.0; 2], [0.4, 0.0], [0.0; 2]);
         for i in 0..50u64 {
             let time_ns = (100 + 20 * i) * MS;
             velocity.flow(&Frame { time_ns, velocity: [0.4, 0.0], sigma: 0.05 }, &attitudes, &frames);
@@ -389,19 +448,19 @@ pub(crate) mod tests {
             }
         };
         dim(&mut velocity, 0..10, 0.4);
-        assert!(velocity.share < 0.55, "the share is nearer to 0.4 than to {SHARE}: {}", velocity.share);
-        assert!((velocity.state[0][1] - 0.4).abs() < 0.08, "{:?}", velocity.state);
-        let before = velocity.state[0][1];
+        assert!(velocity.filter.state[SHARE_AT] < 0.55, "the share is nearer to 0.4 than to {SHARE}: {}", velocity.filter.state[SHARE_AT]);
+        assert!((velocity.velocity_now()[0] - 0.4).abs() < 0.08, "{:?}", velocity.velocity_now());
+        let before = velocity.velocity_now()[0];
         dim(&mut velocity, 10..40, 0.1);
-        let after = velocity.state[0][1];
+        let [after, across] = velocity.velocity_now();
         assert!(
-            after < before - 0.15 && after > 0.0 && velocity.state[1][1].abs() < 1e-3,
+            after < before - 0.15 && after > 0.0 && across.abs() < 1e-3,
             "{before} {after}"
         );
         // A good floor again: nothing of the poor one is kept.
         let frame = Frame { time_ns: 1920 * MS, velocity: [0.1, 0.0], sigma: 0.05 };
         velocity.flow(&frame, &attitudes, &frames);
-        assert_eq!(velocity.share, SHARE);
+        assert_eq!(velocity.filter.state[SHARE_AT], SHARE);
     }
 
     #[test]
@@ -415,7 +474,7 @@ pub(crate) mod tests {
             attitudes.push_felt(i * 33 * MS, 0.0, 0.026, 0.0, [gust - GRAVITY * 0.026_f32.sin(), 0.0]);
         }
         let mut velocity = Velocity::default();
-        velocity.begin(200 * MS, [0.0; 2], [0.0; 2]);
+        velocity.stand(200 * MS, [0.0; 2], [0.0, 0.026]);
         for i in 1..=13u64 {
             let t = 0.06 * i as f32;
             let place = [0.25 * t * t, 0.0];
@@ -436,7 +495,7 @@ pub(crate) mod tests {
         let (attitudes, frames) = (level(), Frames::default());
         let mut velocity = Velocity::default();
         assert!(velocity.at(100 * MS, &attitudes, &frames).is_none());
-        velocity.begin(100 * MS, [0.0; 2], [0.4, 0.0]);
+        velocity.begin(100 * MS, [0.0; 2], [0.4, 0.0], [0.0; 2]);
         let v = velocity.at(110 * MS, &attitudes, &frames).unwrap().velocity;
         assert!((v[0] - 0.4).abs() < 0.02, "{v:?}");
         assert!(velocity.at(500 * MS, &attitudes, &frames).is_none());

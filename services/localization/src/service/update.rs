@@ -14,8 +14,6 @@ use runtime::Loan;
 /// Attitudes averaged before the first set is drawn: a quarter of a second at 30 Hz, enough for the whole
 /// degrees in which a controller gives its yaw.
 const RESTING_SAMPLES: usize = 8;
-/// m/s².
-const GRAVITY_M_S2: f32 = 9.806_65;
 /// Tilt on the ground beyond which it is the ground that slopes, radians; the level error of a calibrated
 /// controller is smaller.
 const LARGEST_LEVEL: f32 = 0.05;
@@ -50,7 +48,6 @@ impl Localization {
             level_sigma: start.level_sigma_deg.to_radians(),
             p_lost: if self.grounded { 0.01 } else { HOPELESS },
         };
-        self.level = self.grounded.then_some([start.level_roll, start.level_pitch]);
         let mut generator = Generator::new(self.seed);
         let update = self.filter.start_at(&start, columns_mut(&mut loan), &mut generator);
         self.believed = Some(self.send(now, now, &update, &generator, loan));
@@ -85,20 +82,19 @@ impl Localization {
         let memory = Memory::from_array(&set.memory);
         let level = self.believed.map_or([0.0; 2], |b| [b.estimate.level_roll, b.estimate.level_pitch]);
         let mean = self.attitudes.mean(set.estimated_ns, time_ns);
-        // What the accelerometer reads of gravity, because it sits aslant, is no motion: as it stood on the ground.
-        if self.believed.is_some() {
-            self.level.get_or_insert(level);
-        }
-        let felt = self.level.map(|level| {
-            [mean.force[0] + GRAVITY_M_S2 * level[1].tan(), mean.force[1] - GRAVITY_M_S2 * level[0].tan()]
-        });
+        // What the accelerometer reads of gravity, because it sits aslant, is no motion.
+        let aslant = self.velocity.accelerometer_error();
+        let felt = self.believed.map(|_| [0, 1].map(|axis| mean.force[axis] + aslant[axis]));
+        // The set's level stands still; what the attitude errs by while it flies is followed beside it.
+        let upright = self.believed.map_or(level, |b| self.upright(&b));
+        let strayed = [upright[0] - level[0], upright[1] - level[1]];
         let dt_s = seconds(set.estimated_ns, time_ns) as f32;
         let motion = Motion {
             felt,
             dt_s,
             blind_s: mean.blind_s,
-            roll_rad: mean.roll,
-            pitch_rad: mean.pitch,
+            roll_rad: mean.roll - strayed[0],
+            pitch_rad: mean.pitch - strayed[1],
             yaw_rad: mean.yaw,
             flow: self.flows.take(time_ns, &self.attitudes, level).or_else(|| self.swept(time_ns, dt_s)),
             grounded: self.grounded,
@@ -107,8 +103,8 @@ impl Localization {
         let news = self.news.follow(motion.dt_s, self.velocity.way, then.yaw);
         let sweep = group.map(|g| Sweep {
             readings: g.readings(),
-            roll_rad: then.roll - level[0],
-            pitch_rad: then.pitch - level[1],
+            roll_rad: then.roll - upright[0],
+            pitch_rad: then.pitch - upright[1],
             yaw_rad: then.yaw,
             news,
         });
@@ -132,7 +128,11 @@ impl Localization {
         if let Some(group) = group {
             let (place, velocity) = ([e.x, e.y], [e.velocity_x, e.velocity_y]);
             let spread = [e.variance_x, e.variance_y].map(f32::sqrt);
-            self.velocity.place(time_ns, place, spread, velocity, &self.attitudes, &frames);
+            if self.grounded {
+                self.velocity.stand(time_ns, place, [e.level_roll, e.level_pitch]);
+            } else {
+                self.velocity.place(time_ns, place, spread, velocity, &self.attitudes, &frames);
+            }
             // Only where the walls are known to be the ones meant.
             let sure = e.sigma() < SURE_M;
             let plan = self.table.plan();
@@ -156,6 +156,11 @@ impl Localization {
             velocity_y: -sin * x + cos * y,
             sigma: (swept.sigma * (SWEPT_S / dt_s).sqrt()).max(LEAST_SWEPT_M_S),
         })
+    }
+
+    /// What the attitude reads when the body is upright (roll, pitch).
+    pub(super) fn upright(&self, b: &Believed) -> [f32; 2] {
+        self.velocity.upright(&self.attitudes, &self.frames(b))
     }
 
     pub(super) fn frames(&self, b: &Believed) -> Frames {
