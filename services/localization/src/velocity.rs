@@ -27,7 +27,7 @@ const BEGIN_M_S: f32 = 0.2;
 const STANDING_M_S: f32 = 0.02;
 /// No attitude errs by more, radians: six degrees are a quarter of a second of the strongest acceleration.
 const LARGEST_LEVEL: f32 = 0.1;
-/// A place farther off is a jump of the particles: begun anew, metres.
+/// A place farther off is a jump of the particles, metres.
 const JUMP_M: f32 = 0.6;
 /// Rms of the air's acceleration, m/s², and the time in which it changes, seconds: FACTS 8 has 0.2 of gusts, more
 /// near walls; the rest and the longer time make room for an error of level.
@@ -238,11 +238,16 @@ impl Velocity {
         let (here, speed) = (self.place_now(), self.velocity_now());
         let off = [0, 1].map(|axis| place[axis] + late * speed[axis] - here[axis]);
         let far = off[0].hypot(off[1]);
-        if !known || far.is_nan() || far > JUMP_M {
+        if !known || far.is_nan() {
             self.begin(time_ns, place, velocity, frames.level);
             return;
         }
         for axis in 0..2 {
+            if far > JUMP_M {
+                // The particles think better of where it is: that is no motion.
+                self.filter.set(PLACE + Y * axis, place[axis] + late * speed[axis], PLACE_M.hypot(spread[axis]));
+                continue;
+            }
             let mut along = [0.0; STATES];
             along[PLACE + Y * axis] = 1.0;
             self.take(&along, off[axis], PLACE_M.hypot(spread[axis]));

@@ -96,7 +96,7 @@ impl Localization {
             roll_rad: mean.roll - strayed[0],
             pitch_rad: mean.pitch - strayed[1],
             yaw_rad: mean.yaw,
-            flow: self.flows.take(time_ns, &self.attitudes, level).or_else(|| self.swept(time_ns, dt_s)),
+            flow: self.flows.take(time_ns, &self.attitudes, level),
             grounded: self.grounded,
         };
         let then = self.attitudes.at(time_ns).unwrap_or_default();
@@ -133,12 +133,12 @@ impl Localization {
             } else {
                 self.velocity.place(time_ns, place, spread, velocity, &self.attitudes, &frames);
             }
-            // Only where the walls are known to be the ones meant.
+            // Walls are the plan's only where it is known which are meant.
             let sure = e.sigma() < SURE_M;
             let plan = self.table.plan();
-            for ranged in group.ranged().filter(|_| sure) {
+            for ranged in group.ranged() {
                 self.velocity.range(time_ns, &ranged, &self.attitudes, &frames, |x, y, angle| {
-                    cast_cone(plan, &self.cone, x, y, angle)
+                    sure.then(|| cast_cone(plan, &self.cone, x, y, angle))?
                 });
             }
         }
