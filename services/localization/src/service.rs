@@ -50,6 +50,8 @@ pub struct Localization {
 
     attitudes: Attitudes,
     flows: Flows,
+    /// When the flow sensor last saw good floor; zero: never.
+    flow_ns: u64,
     velocity: Velocity,
     waiting: Waiting,
     walls: Walls,
@@ -106,6 +108,7 @@ impl Service for Localization {
             seed: start.seed,
             attitudes: Attitudes::default(),
             flows: Flows::default(),
+            flow_ns: 0,
             velocity: Velocity::default(),
             waiting: Waiting::default(),
             walls: Walls::default(),
@@ -208,6 +211,7 @@ impl Localization {
                 self.refused += 1;
                 continue;
             }
+            self.flow_ns = frame.sampled_ns;
             if let Some(b) = self.believed {
                 let p = self.predicted(&b, frame.sampled_ns, false);
                 let (sin, cos) = p.heading.sin_cos();

@@ -45,7 +45,7 @@ impl Default for MotionConfig {
     fn default() -> Self {
         Self {
             velocity_noise: 0.35,
-            felt_noise: 0.1,
+            felt_noise: 0.17,
             position_noise: 0.01,
             position_noise_per_m: 0.05,
             distance_noise: 0.05,

@@ -23,6 +23,8 @@ const HOPELESS: f32 = 0.9;
 const SURE_M: f32 = 0.2;
 /// The velocity that is flown by errs alike for so long, seconds: to the set, one update of it is a part of one witness.
 const SWEPT_S: f32 = 1.5;
+/// Without a flow frame for so long, seconds, the sensor is as good as not there.
+const FLOW_KEPT_S: f64 = 5.0;
 /// And it is never surer than this, m/s.
 const LEAST_SWEPT_M_S: f32 = 0.1;
 
@@ -96,7 +98,7 @@ impl Localization {
             roll_rad: mean.roll - strayed[0],
             pitch_rad: mean.pitch - strayed[1],
             yaw_rad: mean.yaw,
-            flow: self.flows.take(time_ns, &self.attitudes, level),
+            flow: self.flows.take(time_ns, &self.attitudes, upright).or_else(|| self.swept(time_ns, dt_s)),
             grounded: self.grounded,
         };
         let then = self.attitudes.at(time_ns).unwrap_or_default();
@@ -145,8 +147,13 @@ impl Localization {
         self.believed = Some(believed);
     }
 
-    /// What is flown by, as the set takes it while there is no flow: what ranges and poor floors show of the velocity.
+    /// What is flown by, as the set takes it while the flow sensor sees nothing: what ranges and poor floors show of the
+    /// velocity. A vehicle without the sensor lets each particle keep its own velocity: flown by one that errs, and then
+    /// seen moving by it, the set would tell the velocity that it is right.
     fn swept(&self, time_ns: u64, dt_s: f32) -> Option<mcl::Flow> {
+        if self.flow_ns == 0 || seconds(self.flow_ns, time_ns) > FLOW_KEPT_S {
+            return None;
+        }
         let frames = self.frames(self.believed.as_ref().filter(|_| dt_s > 0.0)?);
         let swept = self.velocity.at(time_ns, &self.attitudes, &frames)?;
         let (sin, cos) = (self.attitudes.at(time_ns)?.yaw + frames.heading_offset).sin_cos();
