@@ -19,6 +19,8 @@ const RESTING_SAMPLES: usize = 8;
 const LARGEST_LEVEL: f32 = 0.05;
 /// Doubt of a set that was drawn in the air because nothing better was left.
 const HOPELESS: f32 = 0.9;
+/// A set that doubts itself more than this is no witness of the velocity.
+const DOUBTED: f32 = 0.05;
 /// With a place less sure than this, metres, echoes are compared with the wrong walls.
 const SURE_M: f32 = 0.2;
 /// The velocity that is flown by errs alike for so long, seconds: to the set, one update of it is a part of one witness.
@@ -132,11 +134,14 @@ impl Localization {
             let spread = [e.variance_x, e.variance_y].map(f32::sqrt);
             if self.grounded {
                 self.velocity.stand(time_ns, place, [e.level_roll, e.level_pitch]);
-            } else {
+            } else if e.p_lost < DOUBTED || !self.velocity.is_known(time_ns) {
                 self.velocity.place(time_ns, place, spread, velocity, &self.attitudes, &frames);
+            } else {
+                // A set that has lost its way moves as its errors do.
+                self.velocity.advance(time_ns, &self.attitudes, &frames);
             }
             // Walls are the plan's only where it is known which are meant.
-            let sure = e.sigma() < SURE_M;
+            let sure = e.sigma() < SURE_M && e.p_lost < DOUBTED;
             let plan = self.table.plan();
             for ranged in group.ranged() {
                 self.velocity.range(time_ns, &ranged, &self.attitudes, &frames, |x, y, angle| {
