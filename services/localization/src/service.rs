@@ -52,6 +52,8 @@ pub struct Localization {
     flows: Flows,
     /// When the flow sensor last saw good floor; zero: never.
     flow_ns: u64,
+    /// Since when neither the set nor flow holds the velocity.
+    adrift_ns: Option<u64>,
     velocity: Velocity,
     waiting: Waiting,
     walls: Walls,
@@ -109,6 +111,7 @@ impl Service for Localization {
             attitudes: Attitudes::default(),
             flows: Flows::default(),
             flow_ns: 0,
+            adrift_ns: None,
             velocity: Velocity::default(),
             waiting: Waiting::default(),
             walls: Walls::default(),

@@ -19,9 +19,9 @@ use ipc_types::MAX_SONARS;
 const STEP_S: f64 = 0.01;
 /// Without any measurement for so long the velocity is the particles' again, seconds.
 const SILENT_S: f64 = 0.3;
-/// Standard deviation of one place of the particles, metres: they err by 3 cm, and for so long that each counts for a
-/// tenth of what it would alone.
-const PLACE_M: f32 = 0.1;
+/// Standard deviation of one place of the particles, metres: they err by 3 cm, but for seconds, 16 times a second, and by
+/// much more before they know that they are lost. What is felt carries the velocity that long.
+const PLACE_M: f32 = 0.3;
 /// Standard deviation of the velocity that it begins with, and of one that stands on the ground, m/s.
 const BEGIN_M_S: f32 = 0.2;
 const STANDING_M_S: f32 = 0.02;
@@ -46,7 +46,7 @@ const ERROR_WALK: f64 = 0.015;
 const LEVEL_M_S2: f32 = 0.09;
 const LEVEL_WALK: f64 = 0.002;
 /// Random walk of the velocity where the accelerometer feels the gust: its vibration, 30 readings a second.
-const FELT_WALK: f64 = 0.04;
+const FELT_WALK: f64 = 0.025;
 /// Random walk of the velocity beside the gust, m/s per √s: tilt is read to a tenth of a degree, 30 times a second.
 const WALK: f64 = 0.1;
 /// How fast the weight of a surprising measurement falls, like Student's t: flow errs when the body turns fast.

@@ -81,6 +81,8 @@ pub struct Evidence {
     pub pose_uncertain_s: f32,
     /// The pose is uncertain *and* fewer than two walls answer.
     pub few_walls_s: f32,
+    /// The pose is uncertain *and* nothing holds the velocity: a hover would drift.
+    pub adrift_s: f32,
     /// What is left in the battery does not cover the way home and the reserve.
     pub home_uncovered_s: f32,
     /// A cell is under the return voltage.
@@ -117,6 +119,10 @@ pub struct Policy {
     pub pose_land_s: f32,
     /// Pose uncertain and fewer than two walls in echo: come down.
     pub walls_land_s: f32,
+    /// Standard deviation of the velocity above which a hover drifts, m/s.
+    pub drift_m_s: f32,
+    /// Pose uncertain and adrift: come down.
+    pub drift_land_s: f32,
     /// All side sonars silent: stop.
     pub sonars_hover_s: f32,
     /// All side sonars silent: land.
@@ -158,6 +164,8 @@ impl Default for Policy {
             pose_hover_s: 1.0,
             pose_land_s: 20.0,
             walls_land_s: 5.0,
+            drift_m_s: 0.15,
+            drift_land_s: 1.0,
             sonars_hover_s: 0.5,
             sonars_land_s: 5.0,
             return_volts: 3.5,
@@ -187,6 +195,8 @@ impl Policy {
         within("failsafe.pose_hover_s", self.pose_hover_s, 0.1, 5.0)?;
         within("failsafe.pose_land_s", self.pose_land_s, 2.0, 120.0)?;
         within("failsafe.walls_land_s", self.walls_land_s, 1.0, 60.0)?;
+        within("failsafe.drift_m_s", self.drift_m_s, 0.05, 1.0)?;
+        within("failsafe.drift_land_s", self.drift_land_s, 0.5, 60.0)?;
         within("failsafe.sonars_hover_s", self.sonars_hover_s, 0.1, 2.0)?;
         within("failsafe.sonars_land_s", self.sonars_land_s, 1.0, 30.0)?;
         within("failsafe.return_volts", self.return_volts, 3.2, 4.0)?;
@@ -231,7 +241,7 @@ pub struct Row {
 
 /// The table, with what `e` says about each row. Its order means nothing: the most severe wins.
 #[must_use]
-pub fn table(e: &Evidence, p: &Policy) -> [Row; 19] {
+pub fn table(e: &Evidence, p: &Policy) -> [Row; 20] {
     let navigation = if e.autonomous { e.navigation_silent_s } else { 0.0 };
     let row = |cause, lasted_s, after_s, action, what| Row { cause, after_s, lasted_s, action, what };
     let ordered = e.operator.unwrap_or(Action::None);
@@ -249,6 +259,7 @@ pub fn table(e: &Evidence, p: &Policy) -> [Row; 19] {
             Action::Descend,
             "pose uncertain and under two walls",
         ),
+        row(Cause::Lost, e.adrift_s, p.drift_land_s, Action::Descend, "pose uncertain and velocity adrift"),
         row(
             Cause::AllSonarsSilent,
             e.all_sonars_silent_s,
