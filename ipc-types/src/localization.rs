@@ -23,6 +23,8 @@ message! {
     pub struct Pose on "localization/pose" {
         /// The time that the estimate is for: the newest measurement in it, predicted to the step's `now`.
         pub estimated_ns: u64,
+        /// Since when neither a particle set that trusts itself nor a flow sensor has held the velocity; zero: it is held.
+        pub adrift_ns: u64,
         /// Plan frame.
         pub x_m: f32,
         /// Plan frame.

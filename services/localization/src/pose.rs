@@ -27,7 +27,7 @@ impl Walls {
     }
 }
 
-/// Fills every field but the header.
+/// Fills every field but the header and `adrift_ns`.
 pub(crate) fn fill(pose: &mut Pose, now: u64, e: &Estimate, p: &Predicted, particles: usize, walls: u32) {
     pose.estimated_ns = now;
     pose.x_m = p.position[0];

@@ -52,8 +52,8 @@ pub struct Localization {
     flows: Flows,
     /// When the flow sensor last saw good floor; zero: never.
     flow_ns: u64,
-    /// Since when neither the set nor flow holds the velocity.
-    adrift_ns: Option<u64>,
+    /// Since when neither the set nor flow holds the velocity; zero: it is held.
+    adrift_ns: u64,
     velocity: Velocity,
     waiting: Waiting,
     walls: Walls,
@@ -111,7 +111,7 @@ impl Service for Localization {
             attitudes: Attitudes::default(),
             flows: Flows::default(),
             flow_ns: 0,
-            adrift_ns: None,
+            adrift_ns: 0,
             velocity: Velocity::default(),
             waiting: Waiting::default(),
             walls: Walls::default(),
@@ -295,6 +295,7 @@ impl Localization {
         let walls = self.walls.in_echo(now);
         if let Some(mut pose) = self.poses.loan() {
             fill(&mut pose, now, &b.estimate, &p, b.count, walls);
+            pose.adrift_ns = self.adrift_ns;
             pose.send();
         }
         self.next_pose_ns = now + (1e9 / self.config.pose_hz) as u64;

@@ -51,7 +51,6 @@ pub(crate) struct Timers {
     pub(crate) all_sides: Held,
     pub(crate) pose: Held,
     pub(crate) walls: Held,
-    pub(crate) adrift: Held,
     pub(crate) home: Held,
     pub(crate) low: Held,
     pub(crate) empty: Held,

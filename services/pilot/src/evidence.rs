@@ -41,7 +41,7 @@ impl PilotCore {
         let link = age_s(self.flight.at, now) > 1.0 || self.flight.link != LinkState::Up;
         let tilted = self.tilt().magnitude() > policy.tilt_deg.to_radians();
         let few_walls = !place_known && self.pose.walls < 2;
-        let adrift = !place_known && self.pose.velocity_sigma > policy.drift_m_s;
+        let adrift = self.pose.adrift.filter(|_| !place_known);
         let airborne = self.airborne();
         let autonomous = self.phase == Phase::Autonomous;
         let t = &mut self.timers;
@@ -53,7 +53,7 @@ impl PilotCore {
             all_sonars_silent_s: t.all_sides.update(now, sides > 0 && silent == sides, 0.0),
             pose_uncertain_s: t.pose.update(now, !place_known, CLEAR_S),
             few_walls_s: t.walls.update(now, few_walls, CLEAR_S),
-            adrift_s: t.adrift.update(now, adrift, CLEAR_S),
+            adrift_s: adrift.map_or(0.0, |since| age_s(Some(since), now)),
             home_uncovered_s: t.home.update(now, uncovered, CLEAR_VOLTS_S),
             cell_low_s: t.low.update(now, cell < policy.return_volts, CLEAR_VOLTS_S),
             cell_empty_s: t.empty.update(now, cell < policy.land_volts, CLEAR_S),

@@ -65,6 +65,8 @@ pub(crate) struct PoseSeen {
     pub(crate) air: Vector,
     pub(crate) p_lost: f32,
     pub(crate) walls: u32,
+    /// Since when nothing holds the velocity.
+    pub(crate) adrift: Option<u64>,
     pub(crate) state: LocalizationState,
 }
 
@@ -79,6 +81,7 @@ impl Default for PoseSeen {
             air: Vector::ZERO,
             p_lost: 1.0,
             walls: 0,
+            adrift: None,
             state: LocalizationState::Lost,
         }
     }
@@ -109,6 +112,7 @@ impl PoseSeen {
             air: Vector::new(message.air_x_m_s2, message.air_y_m_s2).known().unwrap_or(Vector::ZERO),
             p_lost: unknown(message.p_lost, 1.0),
             walls: message.walls_in_echo,
+            adrift: (message.adrift_ns > 0).then_some(message.adrift_ns),
             state,
         };
         Some((message.estimated_ns, place, velocity))

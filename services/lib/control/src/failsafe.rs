@@ -119,8 +119,6 @@ pub struct Policy {
     pub pose_land_s: f32,
     /// Pose uncertain and fewer than two walls in echo: come down.
     pub walls_land_s: f32,
-    /// Standard deviation of the velocity above which a hover drifts, m/s.
-    pub drift_m_s: f32,
     /// Pose uncertain and adrift: come down.
     pub drift_land_s: f32,
     /// All side sonars silent: stop.
@@ -164,8 +162,7 @@ impl Default for Policy {
             pose_hover_s: 1.0,
             pose_land_s: 20.0,
             walls_land_s: 5.0,
-            drift_m_s: 0.15,
-            drift_land_s: 1.0,
+            drift_land_s: 3.0,
             sonars_hover_s: 0.5,
             sonars_land_s: 5.0,
             return_volts: 3.5,
@@ -195,7 +192,6 @@ impl Policy {
         within("failsafe.pose_hover_s", self.pose_hover_s, 0.1, 5.0)?;
         within("failsafe.pose_land_s", self.pose_land_s, 2.0, 120.0)?;
         within("failsafe.walls_land_s", self.walls_land_s, 1.0, 60.0)?;
-        within("failsafe.drift_m_s", self.drift_m_s, 0.05, 1.0)?;
         within("failsafe.drift_land_s", self.drift_land_s, 0.5, 60.0)?;
         within("failsafe.sonars_hover_s", self.sonars_hover_s, 0.1, 2.0)?;
         within("failsafe.sonars_land_s", self.sonars_land_s, 1.0, 30.0)?;

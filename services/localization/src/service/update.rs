@@ -21,8 +21,6 @@ const LARGEST_LEVEL: f32 = 0.05;
 const HOPELESS: f32 = 0.9;
 /// A set that doubts itself more than this is no witness of the velocity.
 const DOUBTED: f32 = 0.05;
-/// How fast the velocity goes astray while neither a set nor a flow sensor holds it, m/s²: what a controller's gyro errs by.
-const DRIFT_M_S2: f32 = 0.05;
 /// With a place less sure than this, metres, echoes are compared with the wrong walls.
 const SURE_M: f32 = 0.2;
 /// The velocity that is flown by errs alike for so long, seconds: to the set, one update of it is a part of one witness.
@@ -135,9 +133,9 @@ impl Localization {
             let (place, velocity) = ([e.x, e.y], [e.velocity_x, e.velocity_y]);
             let spread = [e.variance_x, e.variance_y].map(f32::sqrt);
             if self.grounded || e.p_lost < DOUBTED || self.flows_lately(time_ns) {
-                self.adrift_ns = None;
-            } else {
-                self.adrift_ns.get_or_insert(time_ns);
+                self.adrift_ns = 0;
+            } else if self.adrift_ns == 0 {
+                self.adrift_ns = time_ns;
             }
             if self.grounded {
                 self.velocity.stand(time_ns, place, [e.level_roll, e.level_pitch]);
@@ -199,9 +197,7 @@ impl Localization {
         let flows = if with_flow { self.flows.waiting() } else { &[] };
         let mut p = predict(&b.estimate, dynamics, b.time_ns, to_ns, &self.attitudes, flows);
         if let Some(swept) = self.velocity.at(to_ns, &self.attitudes, &self.frames(b)) {
-            let adrift_s = self.adrift_ns.map_or(0.0, |since| seconds(since, to_ns).max(0.0) as f32);
-            p.velocity_sigma = swept.sigma.hypot(DRIFT_M_S2 * adrift_s);
-            (p.velocity, p.air) = (swept.velocity, swept.air);
+            (p.velocity, p.velocity_sigma, p.air) = (swept.velocity, swept.sigma, swept.air);
         }
         if self.grounded {
             p.position = [b.estimate.x, b.estimate.y];
