@@ -149,7 +149,11 @@ mod tests {
         }
         let [vx, vy] = velocity.at(1300 * MS, &attitudes, &frames).unwrap().velocity;
         assert!((vx - 0.3).abs() < 0.03 && vy.abs() < 1e-3, "{vx} {vy}");
-        assert!(velocity.velocity_variance()[0] < 0.5 * velocity.velocity_variance()[1], "{:?}", velocity.velocity_variance());
+        assert!(
+            velocity.velocity_variance()[0] < 0.5 * velocity.velocity_variance()[1],
+            "{:?}",
+            velocity.velocity_variance()
+        );
     }
 
     #[test]
@@ -166,7 +170,11 @@ mod tests {
             velocity.range((100 + 60 * i) * MS, &ranged, &attitudes, &frames, expected);
             most = most.max(velocity.velocity_now()[0]);
         }
-        assert!((velocity.velocity_now()[0] - 0.3).abs() < 0.02 && most < 0.33, "{most} {:?}", velocity.velocity_now());
+        assert!(
+            (velocity.velocity_now()[0] - 0.3).abs() < 0.02 && most < 0.33,
+            "{most} {:?}",
+            velocity.velocity_now()
+        );
     }
 
     #[test]

@@ -1,13 +1,21 @@
 //! The velocity that is flown by.
 //!
 //! The particle set averages over many pings: its velocity follows a gust late, and a loop that flies by it sways.
-//! This filter carries place, velocity and what is not felt (a first-order gust, the Dryden shape) from one
-//! measurement to the next by the measured tilt and what the accelerometer feels: beside the thrust, which is along
-//! the body's own axis, that is the air (Leishman et al. 2014), and a gust is known before it has moved the body. A
-//! controller that does not tell leaves the gust to be learned from the motion. Optical flow, when there is any, measures the velocity within a
-//! frame; over a floor that shows little it still shows a share of the motion, which is learned along with it. The
-//! change of a range between two pings measures the velocity towards what was heard. The particles' place, which the
-//! walls hold fast, keeps the sum right.
+//! This filter carries place and velocity from one measurement to the next by the measured tilt and what the
+//! accelerometer feels: beside the thrust, which is along the body's own axis, that is the air (Leishman et al. 2014),
+//! and a gust is known before it has moved the body.
+//!
+//! The tilt that a controller tells is wrong in a way that is known (Mahony, Hamel and Pflimlin 2008): its vertical is
+//! turned towards what its accelerometer feels, which is gravity and the acceleration. With y = g tan(tilt) + felt
+//! force, all as read, the acceleration is a = y + e, and e grows by k y, k being the gain of that turning: a speed that
+//! was reached would be forgotten within 1/k = 4 s if e were left out. And an accelerometer that sits aslant
+//! feels a part of gravity that turns with the body, while the vertical that has settled on it stays where it was: e
+//! grows by what the turn has moved that part by.
+//!
+//! Optical flow, when there is any, measures the velocity within a frame; over a floor that shows little it still shows
+//! a share of the motion, which is learned along with it. The change of a range between two pings measures the
+//! velocity towards what was heard. The particles' place, which the walls hold fast, keeps the sum right. A controller
+//! that tells no forces leaves the gust (first order, the Dryden shape) to be learned from the motion.
 
 use crate::attitude::{Attitudes, Tilt, seconds};
 use crate::flow::Frame;
@@ -245,7 +253,11 @@ impl Velocity {
         for axis in 0..2 {
             if far > JUMP_M {
                 // The particles think better of where it is: that is no motion.
-                self.filter.set(PLACE + Y * axis, place[axis] + late * speed[axis], PLACE_M.hypot(spread[axis]));
+                self.filter.set(
+                    PLACE + Y * axis,
+                    place[axis] + late * speed[axis],
+                    PLACE_M.hypot(spread[axis]),
+                );
                 continue;
             }
             let mut along = [0.0; STATES];
@@ -385,124 +397,4 @@ fn in_plan(frame: &Frame, attitudes: &Attitudes, frames: &Frames) -> [f32; 2] {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use super::*;
-
-    pub(crate) const MS: u64 = 1_000_000;
-
-    pub(crate) fn level() -> Attitudes {
-        let mut attitudes = Attitudes::default();
-        for i in 1..60 {
-            attitudes.push(i * 33 * MS, 0.0, 0.0, 0.0);
-        }
-        attitudes
-    }
-
-    #[test]
-    fn a_gust_is_followed_within_a_frame_and_a_half() {
-        // 0.5 m/s² from a level body: tilt alone would see nothing.
-        let (attitudes, frames) = (level(), Frames::default());
-        let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.0; 2], [0.0; 2]);
-        for i in 0..30u64 {
-            let time_ns = (100 + 40 * i) * MS;
-            let frame = Frame { time_ns, velocity: [0.5 * 0.04 * i as f32, 0.0], sigma: 0.07 };
-            velocity.flow(&frame, &attitudes, &frames);
-        }
-        let Swept { velocity: v, sigma, .. } =
-            velocity.at((100 + 40 * 29 + 60) * MS, &attitudes, &frames).unwrap();
-        let truth = 0.5 * (0.04 * 29.0 + 0.06);
-        assert!((v[0] - truth).abs() < 0.06 * 0.5 && v[1].abs() < 1e-6, "{v:?}, true {truth}");
-        assert!((0.01..0.07).contains(&sigma), "{sigma}");
-    }
-
-    #[test]
-    fn the_place_alone_shows_a_drift_within_a_second() {
-        // 0.4 m/s that neither tilt nor flow tell of.
-        let (attitudes, frames) = (level(), Frames::default());
-        let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.0; 2], [0.0; 2]);
-        for i in 1..=20u64 {
-            let place = [0.4 * 0.06 * i as f32, 1.0];
-            velocity.place((100 + 60 * i) * MS, place, [0.0; 2], [0.0; 2], &attitudes, &frames);
-            if i == 1 {
-                // The jump across y began it anew.
-                let v = velocity.at(170 * MS, &attitudes, &frames).unwrap().velocity;
-                assert!(v[0].abs() < 0.05 && v[1].abs() < 0.05, "{v:?}");
-            }
-        }
-        let v = velocity.at((100 + 60 * 20) * MS, &attitudes, &frames).unwrap().velocity;
-        assert!((v[0] - 0.4).abs() < 0.12 && v[1].abs() < 0.02, "{v:?}");
-    }
-
-    #[test]
-    fn a_poor_floor_teaches_its_share_and_then_shows_the_velocity_by_it() {
-        // 0.4 m/s, well known; the floor shows four tenths of it. Then a draught that nothing else shows takes three
-        // quarters of the speed away.
-        let (attitudes, frames) = (level(), Frames::default());
-        let mut velocity = Velocity::default();
-        velocity.begin(100 * MS, [0.0; 2], [0.4, 0.0], [0.0; 2]);
-        for i in 0..50u64 {
-            let time_ns = (100 + 20 * i) * MS;
-            velocity.flow(&Frame { time_ns, velocity: [0.4, 0.0], sigma: 0.05 }, &attitudes, &frames);
-        }
-        let dim = |velocity: &mut Velocity, frames_: std::ops::Range<u64>, speed: f32| {
-            for i in frames_ {
-                let frame = Frame { time_ns: (1100 + 20 * i) * MS, velocity: [0.4 * speed, 0.0], sigma: 0.1 };
-                velocity.dim(&frame, &attitudes, &frames);
-            }
-        };
-        dim(&mut velocity, 0..10, 0.4);
-        assert!(velocity.filter.state[SHARE_AT] < 0.55, "the share is nearer to 0.4 than to {SHARE}: {}", velocity.filter.state[SHARE_AT]);
-        assert!((velocity.velocity_now()[0] - 0.4).abs() < 0.08, "{:?}", velocity.velocity_now());
-        let before = velocity.velocity_now()[0];
-        dim(&mut velocity, 10..40, 0.1);
-        let [after, across] = velocity.velocity_now();
-        assert!(
-            after < before - 0.15 && after > 0.0 && across.abs() < 1e-3,
-            "{before} {after}"
-        );
-        // A good floor again: nothing of the poor one is kept.
-        let frame = Frame { time_ns: 1920 * MS, velocity: [0.1, 0.0], sigma: 0.05 };
-        velocity.flow(&frame, &attitudes, &frames);
-        assert_eq!(velocity.filter.state[SHARE_AT], SHARE);
-    }
-
-    #[test]
-    fn a_gust_that_is_felt_is_known_without_flow_and_an_error_of_level_is_none() {
-        // A draught of 0.5 m/s2 for 0.8 s, nothing else measured but the particles' place, which has not moved yet. The
-        // controller sits 1.5 degrees aslant, which nobody knows: its accelerometer does as well.
-        let frames = Frames::default();
-        let mut attitudes = Attitudes::default();
-        for i in 1..60u64 {
-            let gust = if i > 6 { 0.5 } else { 0.0 };
-            attitudes.push_felt(i * 33 * MS, 0.0, 0.026, 0.0, [gust - GRAVITY * 0.026_f32.sin(), 0.0]);
-        }
-        let mut velocity = Velocity::default();
-        velocity.stand(200 * MS, [0.0; 2], [0.0, 0.026]);
-        for i in 1..=13u64 {
-            let t = 0.06 * i as f32;
-            let place = [0.25 * t * t, 0.0];
-            velocity.place((200 + 60 * i) * MS, place, [0.0; 2], [0.0; 2], &attitudes, &frames);
-        }
-        let swept = velocity.at((200 + 60 * 13) * MS, &attitudes, &frames).unwrap();
-        assert!((swept.velocity[0] - 0.5 * 0.78).abs() < 0.03 && swept.velocity[1].abs() < 1e-3, "{swept:?}");
-        // The pilot takes 1.5 degrees for a tilt as long as nobody knows better; with what it is told of the air it comes
-        // to the same, and when the level is known the air is the draught.
-        assert!((swept.air[0] - (0.5 - GRAVITY * 0.026)).abs() < 0.03, "{swept:?}");
-        let level = Frames { level: [0.0, 0.026], ..frames };
-        let air = velocity.at((200 + 60 * 13) * MS, &attitudes, &level).unwrap().air;
-        assert!((air[0] - 0.5).abs() < 0.03, "{air:?}");
-    }
-
-    #[test]
-    fn it_is_silent_when_nothing_is_measured() {
-        let (attitudes, frames) = (level(), Frames::default());
-        let mut velocity = Velocity::default();
-        assert!(velocity.at(100 * MS, &attitudes, &frames).is_none());
-        velocity.begin(100 * MS, [0.0; 2], [0.4, 0.0], [0.0; 2]);
-        let v = velocity.at(110 * MS, &attitudes, &frames).unwrap().velocity;
-        assert!((v[0] - 0.4).abs() < 0.02, "{v:?}");
-        assert!(velocity.at(500 * MS, &attitudes, &frames).is_none());
-    }
-}
+pub(crate) mod tests;
