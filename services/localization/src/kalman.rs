@@ -39,9 +39,9 @@ impl<const N: usize> Kalman<N> {
             }
             row
         });
-        for i in 0..N {
-            for j in i..N {
-                let value = half[i].iter().zip(&motion[j]).map(|(a, b)| a * b).sum();
+        for (i, from) in half.iter().enumerate() {
+            for (j, to) in motion.iter().enumerate().skip(i) {
+                let value = from.iter().zip(to).map(|(a, b)| a * b).sum();
                 (self.variance[i][j], self.variance[j][i]) = (value, value);
             }
         }
