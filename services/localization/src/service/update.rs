@@ -22,7 +22,7 @@ const HOPELESS: f32 = 0.9;
 /// A set that doubts itself more than this is no witness of the velocity.
 const DOUBTED: f32 = 0.05;
 /// With a place less sure than this, metres, echoes are compared with the wrong walls.
-const SURE_M: f32 = 0.2;
+const SURE_M: f32 = 1.0;
 /// The velocity that is flown by errs alike for so long, seconds: to the set, one update of it is a part of one witness.
 const SWEPT_S: f32 = 1.5;
 /// Without a flow frame for so long, seconds, the sensor is as good as not there.
@@ -145,8 +145,9 @@ impl Localization {
                 // A set that has lost its way moves as its errors do.
                 self.velocity.advance(time_ns, &self.attitudes, &frames);
             }
-            // Walls are the plan's only where it is known which are meant.
-            let sure = e.sigma() < SURE_M && e.p_lost < DOUBTED;
+            // Along a corridor the place may be unsure for long, and a set may doubt where along it: the walls beside are
+            // still the ones meant.
+            let sure = e.sigma() < SURE_M;
             let plan = self.table.plan();
             for ranged in group.ranged() {
                 self.velocity.range(time_ns, &ranged, &self.attitudes, &frames, |x, y, angle| {
