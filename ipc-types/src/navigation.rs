@@ -216,6 +216,10 @@ message! {
         pub seen_cell_m: f32,
         /// Last operator command obeyed (its sequence), so that a restart does not obey it twice.
         pub command_sequence: u32,
+        /// For how long something has stood in the way, seconds: a restart goes on waiting where it was.
+        pub waited_s: f32,
+        /// Zero.
+        pub reserved: u32,
         /// The route.
         pub waypoints: [Waypoint; 1024],
         /// The rooms.

@@ -53,7 +53,7 @@ fn what_is_wrong_is_said_in_one_sentence() {
         ("plans/demo.yaml", "image: demo.png", "image: none.png", "none.png: No such file or directory"),
         (
             "config/navigation.toml",
-            "wait_s = 8.0",
+            "wait_s = 16.0",
             "wait_s = -3",
             "wait_s = -3 is out of range: allowed is 0..=60",
         ),

@@ -33,6 +33,17 @@ impl Blockage {
         *self = Self::default();
     }
 
+    /// The same, but for what stood in the way for so long before a restart, seconds: if it still does, that counts.
+    pub fn resume(&mut self, waited_s: f32) {
+        *self = Self { waited_s: waited_s.clamp(0.0, 600.0), ..Self::default() };
+    }
+
+    /// For how long something has stood in the way, seconds.
+    #[must_use]
+    pub fn waited_s(&self) -> f32 {
+        self.waited_s
+    }
+
     /// Whether something stands in the way and is waited for.
     #[must_use]
     pub fn waiting(&self) -> bool {

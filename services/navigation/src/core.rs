@@ -41,6 +41,7 @@ pub struct Core {
     walls: WallLayer,
     steering: Steering,
     pub(crate) blockage: Blockage,
+    waited_before_s: f32,
     pub(crate) mission: Mission,
     pub(crate) journey: Journey,
     stand: Option<(f32, f32)>,
@@ -72,6 +73,7 @@ impl Core {
             rules: GridRules::default(),
             walls: WallLayer::new(),
             blockage: Blockage::default(),
+            waited_before_s: 0.0,
             stand: None,
             last_ns: None,
             text: Text::new("waiting for a command"),
@@ -109,6 +111,7 @@ impl Core {
         match self.journey.restore(patrol) {
             Ok((state, there)) => {
                 self.started_ns = patrol.started_ns;
+                self.waited_before_s = if patrol.waited_s.is_finite() { patrol.waited_s } else { 0.0 };
                 self.mission.restore(state, (patrol.pad_x_m, patrol.pad_y_m), there, patrol.command_sequence);
             }
             Err(Nonsense) => self.refused += 1,
@@ -250,7 +253,7 @@ impl Core {
         match self.journey.work(self.mission.goal(), &place, self.mission.pad()) {
             Work::Ready => {
                 self.mission.route_ready();
-                self.blockage.reset();
+                self.blockage.resume(core::mem::take(&mut self.waited_before_s));
                 self.steering.forget();
             }
             Work::NoWay => self.mission.no_way(Some(&place)),
@@ -306,19 +309,15 @@ impl Core {
         let config = &self.config;
         match self.blockage.watch(dt_s, blocked, along, config.wait_s, config.stuck_s) {
             Verdict::Go | Verdict::Wait => {}
-            verdict @ (Verdict::Blocked | Verdict::Stuck) => {
-                self.journey.obstruct(place, steer.target, &grid.cells, &window, verdict == Verdict::Blocked);
+            Verdict::Blocked | Verdict::Stuck => {
+                self.journey.obstruct(place, steer.target, &grid.cells, &window);
                 self.journey.plan();
-                self.mission.replanning(place);
-                self.blockage.reset();
-                self.steering.forget();
+                self.plan_anew(place);
                 return setpoint;
             }
         }
         if self.mission.goal() == Goal::Round && self.journey.look_again() {
-            self.mission.replanning(place);
-            self.blockage.reset();
-            self.steering.forget();
+            self.plan_anew(place);
             return setpoint;
         }
         if self.journey.homeward() {
@@ -335,8 +334,10 @@ impl Core {
                 self.mission.arrived(end);
                 self.journey.drop_route();
             } else {
-                // There was no way home from afar: asked again from here.
-                self.mission.homeward();
+                // There was no way home from afar: asked again from here, for what stood in the way may have moved on.
+                if !(self.mission.goal() == Goal::Round && self.journey.forgive()) {
+                    self.mission.homeward();
+                }
                 self.mission.replanning(place);
                 self.journey.plan();
             }
@@ -355,6 +356,13 @@ impl Core {
             (setpoint.hold_x_m, setpoint.hold_y_m) = (f32::NAN, f32::NAN);
         }
         setpoint
+    }
+
+    /// Another route is asked for: the drone stands until it is there.
+    fn plan_anew(&mut self, place: &Place) {
+        self.mission.replanning(place);
+        self.blockage.reset();
+        self.steering.forget();
     }
 
     /// The setpoint of an intent, before steering has its say.
@@ -384,6 +392,7 @@ impl Core {
         patrol.state = u32::from(self.mission.state().code());
         (patrol.pad_x_m, patrol.pad_y_m) = self.mission.pad().unwrap_or((f32::NAN, f32::NAN));
         patrol.command_sequence = self.mission.command();
+        patrol.waited_s = self.blockage.waited_s().max(self.waited_before_s);
         patrol.text = self.text;
     }
 }

@@ -22,6 +22,8 @@ pub const KEEP_M: f32 = 0.15;
 const AWAY_M_S: f32 = 0.2;
 /// Beside what no plan shows, and while it stands, the drone keeps to the middle of what is nearer than this, metres.
 const ROOM_M: f32 = 0.4;
+/// The same along the way that it waits for: nearer than people come who wait for it to go, or it would walk before them.
+const WAITING_ROOM_M: f32 = 0.25;
 /// Speed to the middle for each metre that it is off, 1/s, and at most, metres a second: no faster backwards than is heard.
 const CENTRE_PER_S: f32 = 1.0;
 const CENTRE_MOST_M_S: f32 = 0.15;
@@ -91,29 +93,34 @@ impl Fence {
         self.unmapped_m
     }
 
-    /// Motion to the middle between what is on the left and on the right of a wish; without one, of all sides.
-    fn centred(&self, wish: (f32, f32)) -> (f32, f32) {
+    /// Motion to the middle between what is on the left and on the right of a wish. Without one the drone makes room on all
+    /// sides, and less of it along the `way` that it waits for.
+    fn centred(&self, wish: (f32, f32), way: Option<f32>) -> (f32, f32) {
         if self.unmapped_m > ROOM_M {
             return (0.0, 0.0);
         }
-        let gap = |ux: f32, uy: f32| {
+        let gap = |ux: f32, uy: f32, room: f32| {
             let that_way = self.sides.iter().filter(|side| side.0 * ux + side.1 * uy > THAT_WAY_COS);
-            that_way.fold(ROOM_M, |least, side| least.min(side.2))
+            that_way.fold(room, |least, side| least.min(side.2))
         };
         let speed = wish.0.hypot(wish.1);
-        let stands = speed < STANDS_M_S;
-        let (ux, uy) = if stands { (1.0, 0.0) } else { (wish.0 / speed, wish.1 / speed) };
-        let across = CENTRE_PER_S * 0.5 * (gap(-uy, ux) - gap(uy, -ux));
-        let along = if stands { CENTRE_PER_S * 0.5 * (gap(ux, uy) - gap(-ux, -uy)) } else { 0.0 };
+        let ((ux, uy), room) = match way.filter(|way| way.is_finite()) {
+            _ if speed >= STANDS_M_S => ((wish.0 / speed, wish.1 / speed), None),
+            Some(way) => ((way.cos(), way.sin()), Some(WAITING_ROOM_M)),
+            None => ((1.0, 0.0), Some(ROOM_M)),
+        };
+        let across = CENTRE_PER_S * 0.5 * (gap(-uy, ux, ROOM_M) - gap(uy, -ux, ROOM_M));
+        let along = room.map_or(0.0, |room| CENTRE_PER_S * 0.5 * (gap(ux, uy, room) - gap(-ux, -uy, room)));
         let (cx, cy) = (along * ux - across * uy, along * uy + across * ux);
         let share = (CENTRE_MOST_M_S / cx.hypot(cy).max(1e-3)).min(1.0);
         (share * cx, share * cy)
     }
 
-    /// What is left of a wish, plan frame, and whether something is nearer than is kept.
+    /// What is left of a wish, plan frame, and whether something is nearer than is kept. `way`: the direction that the drone
+    /// wants to go in, radians.
     #[must_use]
-    pub fn keep(&self, wish: (f32, f32)) -> ((f32, f32), bool) {
-        let (cx, cy) = self.centred(wish);
+    pub fn keep(&self, wish: (f32, f32), way: Option<f32>) -> ((f32, f32), bool) {
+        let (cx, cy) = self.centred(wish, way);
         let (mut vx, mut vy) = (wish.0 + cx, wish.1 + cy);
         for _ in 0..PASSES {
             for (ux, uy, gap) in self.sides.iter().filter(|side| side.2.is_finite()) {
@@ -160,16 +167,16 @@ mod tests {
 
     #[test]
     fn the_speed_towards_something_falls_with_the_gap_and_along_it_does_not() {
-        let ((vx, vy), near) = fence(&[(0, 0.35)]).keep((0.5, 0.3));
+        let ((vx, vy), near) = fence(&[(0, 0.35)]).keep((0.5, 0.3), None);
         assert!((vx - GAIN_PER_S * (0.35 - KEEP_M)).abs() < 1e-5 && (vy - 0.3).abs() < 1e-5 && !near);
-        assert_eq!(fence(&[]).keep((0.5, 0.3)), ((0.5, 0.3), false));
+        assert_eq!(fence(&[]).keep((0.5, 0.3), None), ((0.5, 0.3), false));
     }
 
     #[test]
     fn what_is_too_near_is_left_even_without_a_wish() {
-        let ((vx, vy), near) = fence(&[(0, 0.05)]).keep((0.0, 0.0));
+        let ((vx, vy), near) = fence(&[(0, 0.05)]).keep((0.0, 0.0), None);
         assert!((-AWAY_M_S..-0.05).contains(&vx) && vy.abs() < 1e-5 && near, "{vx} {vy}");
-        let ((vx, _), _) = fence(&[(0, -1.0)]).keep((0.5, 0.0));
+        let ((vx, _), _) = fence(&[(0, -1.0)]).keep((0.5, 0.0), None);
         assert!((vx + AWAY_M_S).abs() < 1e-5, "never faster away than allowed: {vx}");
     }
 
@@ -177,20 +184,28 @@ mod tests {
     fn beside_something_unmapped_the_drone_keeps_to_the_middle_and_makes_room_while_it_stands() {
         // A box 0.2 m to the left, a wall 0.3 m to the right.
         let beside = Fence { unmapped_m: 0.2, ..fence(&[(6, 0.2), (18, 0.3)]) };
-        let ((vx, vy), _) = beside.keep((0.4, 0.0));
+        let ((vx, vy), _) = beside.keep((0.4, 0.0), None);
         assert!((vx - 0.4).abs() < 1e-4 && (vy + 0.5 * CENTRE_PER_S * 0.1).abs() < 1e-4, "{vx} {vy}");
         // Somebody 0.25 m ahead, nothing behind: back, no faster than allowed, and not for ever.
-        let before = |gap: f32| Fence { unmapped_m: gap, ..fence(&[(0, gap)]) }.keep((0.0, 0.0)).0;
-        assert!((before(0.25).0 + 0.5 * CENTRE_PER_S * 0.15).abs() < 1e-4, "{:?}", before(0.25));
-        assert_eq!(before(ROOM_M + 0.01), (0.0, 0.0));
+        let before = |gap: f32, way| Fence { unmapped_m: gap, ..fence(&[(0, gap)]) }.keep((0.0, 0.0), way).0;
+        let back = |room: f32, gap: f32| -0.5 * CENTRE_PER_S * (room - gap);
+        assert!((before(0.25, None).0 - back(ROOM_M, 0.25)).abs() < 1e-4, "{:?}", before(0.25, None));
+        assert_eq!(before(ROOM_M + 0.01, None), (0.0, 0.0));
+        // On the way that it waits for, people who wait too are not led on by a drone that creeps away from them...
+        let waiting = before(0.2, Some(0.0));
+        assert!((waiting.0 - back(WAITING_ROOM_M, 0.2)).abs() < 1e-4, "{waiting:?}");
+        assert_eq!(before(WAITING_ROOM_M + 0.01, Some(0.0)), (0.0, 0.0));
+        // ...but beside it there is room to be made, so that the way on opens.
+        let aside = before(0.25, Some(core::f32::consts::FRAC_PI_2));
+        assert!((aside.0 - back(ROOM_M, 0.25)).abs() < 1e-4, "{aside:?}");
         // Walls alone do not move it: the planned line keeps to their middle.
-        assert_eq!(fence(&[(0, 0.25)]).keep((0.0, 0.0)).0, (0.0, 0.0));
+        assert_eq!(fence(&[(0, 0.25)]).keep((0.0, 0.0), None).0, (0.0, 0.0));
     }
 
     #[test]
     fn between_the_posts_of_a_door_the_way_on_stays_open() {
         // 0.225 m to either side, nothing ahead.
-        let ((vx, vy), near) = fence(&[(6, 0.225), (18, 0.225)]).keep((0.4, 0.2));
+        let ((vx, vy), near) = fence(&[(6, 0.225), (18, 0.225)]).keep((0.4, 0.2), None);
         assert!((vx - 0.4).abs() < 1e-4 && vy <= GAIN_PER_S * (0.225 - KEEP_M) + 1e-4 && !near, "{vx} {vy}");
     }
 }

@@ -16,34 +16,27 @@ const SURE_CERTAINTY: u8 = 16;
 const UNSEEN_HALF_M: f32 = 0.15;
 
 impl Journey {
-    /// Something stands in the way (`seen_by_sonar`) or the drone does not get on: remembers it, and gives
-    /// the place up that it was flying to after a number of tries. `towards` is the direction of the way.
-    pub fn obstruct(
-        &mut self,
-        place: &Place,
-        towards: f32,
-        cells: &[u8],
-        window: &Window,
-        seen_by_sonar: bool,
-    ) {
+    /// Something stands in the way, or the drone does not get on: remembers what the sonars have seen there, and gives the
+    /// place up that it was flying to after a number of tries. `towards` is the direction of the way.
+    pub fn obstruct(&mut self, place: &Place, towards: f32, cells: &[u8], window: &Window) {
         if !towards.is_finite() {
             return;
         }
         let (sin, cos) = towards.sin_cos();
         let mut nearest = f32::INFINITY;
-        if seen_by_sonar {
-            let map = &mut self.map;
-            for_each_certain(cells, SURE_CERTAINTY, |index| {
-                let (x, y) = window.centre(index);
-                let (dx, dy) = (x - place.x, y - place.y);
-                let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
-                if along > 0.0 && along < AHEAD_M && aside.abs() < BESIDE_M {
-                    map.mark_unmapped(x, y);
-                    nearest = nearest.min(along);
-                }
-            });
-        }
-        if !nearest.is_finite() {
+        let map = &mut self.map;
+        for_each_certain(cells, SURE_CERTAINTY, |index| {
+            let (x, y) = window.centre(index);
+            let (dx, dy) = (x - place.x, y - place.y);
+            let (along, aside) = (dx * cos + dy * sin, dy * cos - dx * sin);
+            if along > 0.0 && along < AHEAD_M && aside.abs() < BESIDE_M {
+                map.mark_unmapped(x, y);
+                nearest = nearest.min(along);
+            }
+        });
+        if nearest.is_finite() {
+            self.shut_door(place.x + nearest * cos, place.y + nearest * sin);
+        } else {
             nearest = self.map.limits().radius_m + UNSEEN_HALF_M;
             for aside in [-UNSEEN_HALF_M, 0.0, UNSEEN_HALF_M] {
                 self.map.mark_unmapped(
@@ -52,22 +45,24 @@ impl Journey {
                 );
             }
         }
-        let (x, y) = (place.x + nearest * cos, place.y + nearest * sin);
-        if let Some(door) = self.map.door_near(x, y, DOOR_M) {
-            self.map.set_door(door, true);
-            if let Some(times) = self.found_shut.get_mut(door) {
-                *times += 1;
-            }
-            self.review = true;
-            // The line between the posts is marked too: it survives a restart, the door's state does not.
-            if let Some((a, b)) = self.map.doors().get(door).map(|door| (door.a, door.b)) {
-                for i in 0..=8 {
-                    let t = i as f32 / 8.0;
-                    self.map.mark_unmapped(a.0 + t * (b.0 - a.0), a.1 + t * (b.1 - a.1));
-                }
+        self.count_try();
+    }
+
+    /// What was seen in a door is the door.
+    fn shut_door(&mut self, x: f32, y: f32) {
+        let Some(door) = self.map.door_near(x, y, DOOR_M) else { return };
+        self.map.set_door(door, true);
+        if let Some(times) = self.found_shut.get_mut(door) {
+            *times += 1;
+        }
+        self.review = true;
+        // The line between the posts is marked too: it survives a restart, the door's state does not.
+        if let Some((a, b)) = self.map.doors().get(door).map(|door| (door.a, door.b)) {
+            for i in 0..=8 {
+                let t = i as f32 / 8.0;
+                self.map.mark_unmapped(a.0 + t * (b.0 - a.0), a.1 + t * (b.1 - a.1));
             }
         }
-        self.count_try();
     }
 
     fn count_try(&mut self) {

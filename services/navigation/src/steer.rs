@@ -66,6 +66,9 @@ const ROUND_GAP_M: f32 = 0.25;
 const FREE_AGAIN_M: f32 = 0.2;
 /// Less than this much way before the stop is not worth going, metres.
 const WORTH_M: f32 = 0.05;
+/// A valley with room leads away when it is farther than this from the way, and on again when nearer than that, radians.
+const LEADS_AWAY_RAD: f32 = 60.0 * core::f32::consts::PI / 180.0;
+const LEADS_ON_RAD: f32 = 30.0 * core::f32::consts::PI / 180.0;
 /// Slowest approach to the end of the route, metres a second.
 const CREEP_M_S: f32 = 0.1;
 
@@ -188,7 +191,9 @@ impl Steering {
             max_speed_m_s: self.craft.cruise_m_s,
         };
         let mut decision = self.roomy.decide(&situation, histogram);
-        let squeezing = decision.reason == Reason::Blocked;
+        // A valley that leads away is left for a narrower one that leads on.
+        let off = decision.direction_rad.map_or(f32::INFINITY, |d| wrap(d - target_rad).abs());
+        let squeezing = off > if self.squeezing { LEADS_ON_RAD } else { LEADS_AWAY_RAD };
         if squeezing {
             if !self.squeezing {
                 self.tight.forget();
@@ -210,7 +215,7 @@ impl Steering {
         };
         let Some(aim) = aim else {
             self.speed = 0.0;
-            (steer.velocity, _) = Fence::around(scene, self.craft.radius_m).keep((0.0, 0.0));
+            (steer.velocity, _) = Fence::around(scene, self.craft.radius_m).keep((0.0, 0.0), None);
             return steer;
         };
         let reserve = self.craft.radius_m + config.stop_gap_m;
@@ -222,6 +227,8 @@ impl Steering {
             _ if narrow && on_line - reserve > wanted => {
                 (target_rad, self.craft.cruise_m_s, SteeringReason::TargetSafe, on_line)
             }
+            // A valley beside what stands in a door leads nowhere.
+            _ if narrow && aim.gate => (target_rad, 0.0, SteeringReason::Blocked, on_line),
             Some(direction) => {
                 (direction, decision.speed_m_s, reason_of(decision.reason), free(direction, margin_m))
             }
@@ -271,7 +278,7 @@ impl Steering {
         {
             wish = along(&aim, place, speed, entering, wish);
         }
-        let (velocity, backing) = fence.keep(wish);
+        let (velocity, backing) = fence.keep(wish, Some(target_rad));
         steer.velocity = velocity;
         if backing {
             steer.reason = SteeringReason::BackingOff;

@@ -17,6 +17,8 @@ const HOME_PACE: f32 = 0.6;
 const HOVER_HOURS: f32 = 1.0 / 6.0;
 /// Time of a landing, seconds.
 const LANDING_S: f32 = 15.0;
+/// Time for what happens on the way home, seconds: somebody in a door is waited for, or it is shut and there is another.
+const MEETING_S: f32 = 40.0;
 
 impl PilotCore {
     /// Gathers the evidence and judges it.
@@ -40,8 +42,9 @@ impl PilotCore {
         let uncovered = self.home_uncovered();
         let link = age_s(self.flight.at, now) > 1.0 || self.flight.link != LinkState::Up;
         let tilted = self.tilt().magnitude() > policy.tilt_deg.to_radians();
-        let few_walls = !place_known && self.pose.walls < 2;
         let adrift = self.pose.adrift.filter(|_| !place_known);
+        // Walls hold a hover that flow does not.
+        let few_walls = adrift.is_some() && self.pose.walls < 2;
         let airborne = self.airborne();
         let autonomous = self.phase == Phase::Autonomous;
         let t = &mut self.timers;
@@ -74,7 +77,7 @@ impl PilotCore {
         let Some(length) = way.length_m(self.motion.place()) else { return false };
         let measured = self.flight.amps > 0.5;
         let amps = if measured { self.flight.amps } else { self.craft.capacity_mah * 1e-3 / HOVER_HOURS };
-        let seconds = length / (HOME_PACE * self.craft.cruise_m_s).max(0.05) + LANDING_S;
+        let seconds = length / (HOME_PACE * self.craft.cruise_m_s).max(0.05) + MEETING_S + LANDING_S;
         let needed = amps * 1000.0 * seconds / 3600.0 * (1.0 + self.config.failsafe.home_reserve);
         USABLE * self.craft.capacity_mah - drawn < needed
     }

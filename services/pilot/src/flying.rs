@@ -4,9 +4,10 @@ use crate::core::{Decided, PilotCore};
 use crate::phases::BLIND_M_S;
 use crate::senses::age_s;
 use control::{
-    Action, Asking, Flown, Source, Tilt, Vector, VerticalWish, arbitrate, hold_velocity, stick, wrap_angle,
-    yaw_rate,
+    Action, Asking, Cause, Flown, Source, Tilt, Vector, VerticalWish, arbitrate, hold_velocity, stick,
+    wrap_angle, yaw_rate,
 };
+use core::f32::consts::TAU;
 use ipc_types::{ChannelSource, Phase, SetpointKind};
 
 /// Near the ground tilts stay small, so that no skid touches first: clearance in metres, most tilt in radians.
@@ -31,6 +32,10 @@ const AIR_S: f32 = 1.0;
 const FASTEST: f32 = 1.2;
 /// A velocity is reckoned on by tilt alone for so long, seconds.
 const RECKON_S: f32 = 1.5;
+/// To and fro by so much, radians, once in so many seconds: the sonars look 45 degrees apart, and a turn of 18 degrees a
+/// second is heard and measured as well as none.
+const LOOK_RAD: f32 = 0.785;
+const LOOK_S: f32 = 16.0;
 /// Growth and fall of the wished height, m/s.
 const HEIGHT_SLEW_M_S: f32 = 0.3;
 
@@ -128,12 +133,30 @@ impl PilotCore {
                 self.hold = None;
             }
             self.settle();
+            self.look_around(now);
+        }
+        if source != Source::Failsafe {
+            self.looks_from = None;
         }
         let wish = match self.hold {
             Some(hold) if place => hold_velocity(&self.config.hold, hold, self.motion.place()),
             _ => Vector::ZERO,
         };
         (wish, source)
+    }
+
+    /// Who stands and is not sure of its place turns to and fro: from the same heading it hears the same again.
+    fn look_around(&mut self, now: u64) {
+        let hovers =
+            self.judged.action == Action::Hover && self.judged.causes & Cause::PoseUncertain.bit() != 0;
+        if !hovers || age_s(self.pose.at, now) > FRESH_POSE_S {
+            self.looks_from = None;
+            return;
+        }
+        let here = self.hold_heading.unwrap_or_else(|| self.heading());
+        let (since, from) = *self.looks_from.get_or_insert((now, here));
+        let phase = TAU * age_s(Some(since), now) / LOOK_S;
+        self.hold_heading = Some(wrap_angle(from + LOOK_RAD * phase.sin()));
     }
 
     fn fly(&mut self, now: u64, dt: f32) -> Decided {

@@ -118,6 +118,20 @@ pub struct Vfh {
     table: Table,
     blocked: [u8; SECTORS],
     chosen: Option<usize>,
+    side: Option<Side>,
+}
+
+/// The side of the target that a valley lies on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    Left,
+    Right,
+}
+
+impl Side {
+    fn of(sector: usize, target: usize) -> Self {
+        if (sector + SECTORS - target) % SECTORS <= SECTORS / 2 { Self::Left } else { Self::Right }
+    }
 }
 
 impl Vfh {
@@ -129,7 +143,7 @@ impl Vfh {
         config.validate()?;
         let b = config.a * CELL_M / config.reach_m;
         let table = Table::new(config.a, b, config.clearance_m);
-        Ok(Self { config, table, blocked: [0; SECTORS], chosen: None })
+        Ok(Self { config, table, blocked: [0; SECTORS], chosen: None, side: None })
     }
 
     /// The parameters in use.
@@ -152,13 +166,14 @@ impl Vfh {
             // Both ends compete: a lone obstacle leaves one valley that can be entered on either side of it.
             for border in [Border::First, Border::Last] {
                 let distance = valley::apart(valley.border(border), target);
-                if distance > limit {
-                    continue;
-                }
                 let (middle, wide) = valley::from_border(valley, border, config.s_max);
                 let sector = middle.round() as usize % SECTORS;
-                let flown = self.chosen.is_some_and(|k| valley::apart(k, sector) <= config.s_max);
+                let flown = self.side.is_some_and(|side| side == Side::of(sector, target));
+                // On the way round something the target turns to its side: no reason to try the other one.
                 let cost = if flown { distance.saturating_sub(config.continuity) } else { distance };
+                if cost > limit {
+                    continue;
+                }
                 // Of equal ones the wider, so that the choice does not hang on the numbering of the sectors.
                 if best.is_none_or(|(c, v, _, _)| cost < c || (cost == c && valley.width > v.width)) {
                     best = Some((cost, valley, middle, wide));
@@ -205,14 +220,14 @@ impl Avoider for Vfh {
             threshold_low: low,
         };
         if !situation.target_rad.is_finite() {
-            self.chosen = None;
+            (self.chosen, self.side) = (None, None);
             return stop(Reason::Holding);
         }
         // Folded once: its sector and the direction flown must be the same angle to the last bit.
         let target_rad = wrap(situation.target_rad);
         let target = sector_of(target_rad);
         let Some((valley, middle, wide)) = self.choose(target) else {
-            self.chosen = None;
+            (self.chosen, self.side) = (None, None);
             return stop(Reason::Blocked);
         };
         let straight = self.config.straight_at_target && valley.contains(target);
@@ -232,6 +247,7 @@ impl Avoider for Vfh {
             (wrap(k * SECTOR_RAD), k.round() as usize % SECTORS, reason)
         };
         self.chosen = Some(sector);
+        self.side = (!straight).then(|| Side::of(sector, target));
         let slow = self.config.slow_density * gain;
         let density = histogram.smoothed[sector].min(slow);
         let max_speed =
@@ -248,6 +264,6 @@ impl Avoider for Vfh {
 
     fn forget(&mut self) {
         self.blocked = [0; SECTORS];
-        self.chosen = None;
+        (self.chosen, self.side) = (None, None);
     }
 }

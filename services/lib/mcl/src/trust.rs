@@ -61,7 +61,7 @@ impl TrustConfig {
     ) -> f32 {
         let p = if (0.0..=1.0).contains(&p_lost) { p_lost } else { 0.5 };
         let dt = dt.clamp(0.0, 5.0);
-        let news = news.max(STALE);
+        let (fresh, news) = (news, news.max(STALE));
         let p = p + (1.0 - p) * (self.hazard_per_s * news * dt).min(0.5)
             - p * (self.recovery_per_s * dt).min(0.5);
         let p = p.clamp(1e-6, 1.0 - 1e-6);
@@ -69,6 +69,8 @@ impl TrustConfig {
         for (by_set, blind, short) in evidence {
             let raise = if short { self.raise_short } else { self.raise };
             let ratio = (blind.max(1e-6) / by_set.max(1e-6)).ln() * self.temper;
+            // What stands beside a drone that stands has had its say.
+            let news = if short && ratio > 0.0 { fresh } else { news };
             // NaN (a broken set) counts as the worst reading.
             odds += news * if ratio.is_nan() { self.raise } else { ratio.clamp(-self.lower, raise) };
         }

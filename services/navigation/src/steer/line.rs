@@ -16,6 +16,9 @@ const SHORTEST_AHEAD_M: f32 = 0.35;
 const AIM_SAMPLES: usize = 8;
 /// Length of route that its direction is taken from, metres.
 const ONWARD_M: f32 = 0.3;
+/// Where walls come nearer to both sides of the route by so much, over so much aside, metres, there is no way round.
+const GATE_M: f32 = 0.05;
+const GATE_ASIDE_M: f32 = 0.25;
 /// The drone comes back to the line at this rate, 1/s: a quarter of the velocity loop's.
 const BACK_PER_S: f32 = 1.5;
 const BACK_MOST_M_S: f32 = 0.25;
@@ -36,6 +39,8 @@ pub struct Aim {
     pub clearance_m: f32,
     /// Least clearance of the route between here and there, metres.
     pub route_m: f32,
+    /// The narrowest place there has a wall to either side, like a door: what stands in it is not gone round.
+    pub gate: bool,
     /// Distance of the drone from the route, metres.
     pub aside_m: f32,
     /// The place of the route that is nearest to the drone, and one a little further on: its direction.
@@ -61,10 +66,12 @@ impl Steering {
         let here = field.distance(place.x, place.y);
         let mut ahead = config.look_ahead_m;
         loop {
-            let route = (0..=AIM_SAMPLES)
-                .map(|i| track.aim(ahead * i as f32 / AIM_SAMPLES as f32))
-                .map(|(x, y)| field.distance(x, y))
-                .fold(f32::INFINITY, f32::min);
+            let sample = |i: usize| track.aim(ahead * i as f32 / AIM_SAMPLES as f32);
+            let clearance = |i: usize| field.distance(sample(i).0, sample(i).1);
+            let (narrowest, route) = (0..=AIM_SAMPLES)
+                .map(|i| (i, clearance(i)))
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+                .unwrap_or((0, f32::INFINITY));
             let (x, y) = track.aim(ahead);
             let line = clearance_between(field, (place.x, place.y), (x, y));
             if ahead < SHORTEST_AHEAD_M || line >= route.min(here).min(CUT_FREELY_M) - CUT_LOSS_M {
@@ -74,6 +81,12 @@ impl Steering {
                     y,
                     clearance_m: route.min(line),
                     route_m: route,
+                    gate: gate(
+                        field,
+                        sample(narrowest.saturating_sub(1)),
+                        sample(narrowest),
+                        sample((narrowest + 1).min(AIM_SAMPLES)),
+                    ),
                     aside_m: track.aside(),
                     foot: track.at(track.along()),
                     onward: track.aim(ONWARD_M),
@@ -102,6 +115,19 @@ pub(super) fn along(aim: &Aim, place: &Place, speed: f32, entering: bool, wish: 
     let tight = if entering { ((OPEN_M - aim.route_m) / (OPEN_M - DOOR_M)).clamp(0.0, 1.0) } else { 0.0 };
     let onward = speed * (1.0 - tight * (across.abs().max(soon.abs()) / ASIDE_STOPS_M).min(1.0));
     (onward * tx - back * ty, onward * ty + back * tx)
+}
+
+/// Whether walls come nearer to either side of a place, on the way from one before it to one behind.
+fn gate(field: &DistanceField, before: (f32, f32), place: (f32, f32), behind: (f32, f32)) -> bool {
+    let (dx, dy) = (behind.0 - before.0, behind.1 - before.1);
+    let length = dx.hypot(dy);
+    if length < 0.01 {
+        return false;
+    }
+    let (nx, ny) = (-dy / length * GATE_ASIDE_M, dx / length * GATE_ASIDE_M);
+    let here = field.distance(place.0, place.1);
+    let aside = |side: f32| field.distance(place.0 + side * nx, place.1 + side * ny);
+    aside(1.0) < here - GATE_M && aside(-1.0) < here - GATE_M
 }
 
 /// Least clearance of the plan along a straight line, metres, looked at every 10 cm.
