@@ -5,6 +5,7 @@
 //! that the keeper holds.
 
 mod attitude;
+mod clutter;
 mod config;
 mod flow;
 mod kalman;

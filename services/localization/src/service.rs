@@ -4,6 +4,7 @@ mod update;
 
 use crate::LocalizationConfig;
 use crate::attitude::{Attitudes, seconds};
+use crate::clutter::Clutter;
 use crate::flow::{Flows, Frame};
 use crate::news::News;
 use crate::pose::{Walls, fill};
@@ -58,6 +59,7 @@ pub struct Localization {
     waiting: Waiting,
     walls: Walls,
     news: News,
+    clutter: Clutter,
     set: Set,
     /// Number and time of the last set sent.
     sent: u64,
@@ -93,6 +95,7 @@ impl Service for Localization {
         })?;
         let filter =
             Filter::new(config.filter(), Arc::clone(&table), MAX_PARTICLES).map_err(StartError::invalid)?;
+        let clutter = Clutter::new(table.plan(), start.sidecar()?.doors);
         let mut service = Self {
             ranges: ports.input(8)?,
             attitude: ports.input(16)?,
@@ -116,6 +119,7 @@ impl Service for Localization {
             waiting: Waiting::default(),
             walls: Walls::default(),
             news: News::default(),
+            clutter,
             set: Set::None,
             sent: 0,
             sent_ns: 0,

@@ -82,7 +82,15 @@ fn update(c: &mut Criterion) {
                 Reading { echo, bearing_rad, elevation_rad: 0.0, mount_x: 0.2 * cos, mount_y: 0.2 * sin }
             })
             .collect();
-        let sweep = Sweep { readings: &readings, roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0, news: 1.0 };
+        let sweep = Sweep {
+            readings: &readings,
+            roll_rad: 0.0,
+            pitch_rad: 0.0,
+            yaw_rad: 0.0,
+            news: 1.0,
+            familiar: 0,
+            doors: 0,
+        };
         let motion = Motion {
             dt_s: 0.06,
             flow: Some(Flow { velocity_x: 0.0, velocity_y: 0.0, sigma: 0.08 }),

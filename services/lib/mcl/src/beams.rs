@@ -110,7 +110,7 @@ impl Beams {
             return;
         }
         let model = &self.model;
-        for reading in sweep.readings.iter().take(MAX_READINGS) {
+        for (_, reading) in sweep.telling() {
             let Some(echo) = model.levelled(reading, sweep) else { continue };
             let beam = &mut self.beams[self.used];
             beam.bearing = reading.bearing_rad;
@@ -243,7 +243,15 @@ mod tests {
         let ratio = |news: f32| {
             let mut beams = Beams::new(&SonarConfig::default());
             let readings = [reading];
-            beams.prepare(&Sweep { readings: &readings, roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0, news });
+            beams.prepare(&Sweep {
+                readings: &readings,
+                roll_rad: 0.0,
+                pitch_rad: 0.0,
+                yaw_rad: 0.0,
+                news,
+                familiar: 0,
+                doors: 0,
+            });
             let mut weight = [1.0, 1.0];
             beams.weigh(&Wall, &[0.0, 0.1], &[0.0; 2], &[0.0; 2], &mut weight);
             weight[1] / weight[0]

@@ -10,6 +10,7 @@ use crate::motion::{Motion, NOISE_ROWS, Step};
 use crate::particles::{ParticlesMut, ParticlesRef};
 use crate::resample::draw_ancestors;
 use crate::sonar::{Echo, Sweep};
+use crate::trust::Evidence;
 
 /// Particles are worked on in blocks of this many, so that what passes between the steps stays in the
 /// first-level cache.
@@ -85,6 +86,8 @@ pub struct Update {
     pub resampled: bool,
     /// Bit i: reading i of the sweep was an echo that fits the plan at the estimated place.
     pub fits: u32,
+    /// Bit i: reading i was shorter than the plan has it there.
+    pub short: u32,
 }
 
 /// The filter: settings, the map, and room to work in. It holds nothing of the set: the same arguments
@@ -162,7 +165,7 @@ impl<M: RangeMap> Filter<M> {
             effective: estimate.effective,
             wanted: self.wanted(&estimate, spread),
         };
-        Update { count, estimate, memory, resampled: false, fits: 0 }
+        Update { count, estimate, memory, resampled: false, fits: 0, short: 0 }
     }
 
     /// Reads the set `previous`, moves it by `motion`, weighs it by `sweep` when there is one, and
@@ -231,10 +234,14 @@ impl<M: RangeMap> Filter<M> {
         let doubt = if !sound {
             1.0
         } else if let Some(sweep) = sweep {
-            let heard =
-                self.compared(sweep, &estimate).map(|(_, range, expected, sigmas)| range < expected - sigmas);
-            let evidence =
-                self.beams.evidence(prior).zip(heard).map(|((set, blind), short)| (set, blind, short));
+            let heard = self.compared(sweep, &estimate).map(|(i, range, expected, sigmas)| {
+                (range < expected - sigmas, sweep.familiar >> i & 1 == 1)
+            });
+            let evidence = self
+                .beams
+                .evidence(prior)
+                .zip(heard)
+                .map(|((by_set, blind), (short, familiar))| Evidence { by_set, blind, short, familiar });
             self.config.trust.step(memory.p_lost, motion.dt_s, sweep.news(), evidence)
         } else if motion.grounded {
             memory.p_lost
@@ -244,8 +251,8 @@ impl<M: RangeMap> Filter<M> {
         let estimate = estimate.doubted(doubt);
         let memory =
             Memory { p_lost: doubt, effective: estimate.effective, wanted: self.wanted(&estimate, spread) };
-        let fits = sweep.map_or(0, |s| self.fits(s, &estimate));
-        Update { count, estimate, memory, resampled, fits }
+        let (fits, short) = sweep.map_or((0, 0), |s| self.fits(s, &estimate));
+        Update { count, estimate, memory, resampled, fits, short }
     }
 
     /// Size of the next set, and whether ancestors must be drawn for it: when the weights have become
@@ -291,7 +298,7 @@ impl<M: RangeMap> Filter<M> {
         let model = self.beams.model();
         let heading = sweep.yaw_rad + e.heading_offset;
         let (sin, cos) = heading.sin_cos();
-        sweep.readings.iter().take(crate::MAX_READINGS).enumerate().filter_map(move |(i, r)| {
+        sweep.telling().filter_map(move |(i, r)| {
             let range = match model.levelled(r, sweep)? {
                 Echo::Range(range) => range,
                 Echo::Nothing => f32::INFINITY,
@@ -305,10 +312,12 @@ impl<M: RangeMap> Filter<M> {
         })
     }
 
-    fn fits(&self, sweep: &Sweep<'_>, e: &Estimate) -> u32 {
-        self.compared(sweep, e)
-            .filter(|(_, range, expected, sigmas)| (range - expected).abs() < *sigmas)
-            .fold(0, |fits, (i, ..)| fits | 1 << i)
+    /// Which echoes fit the plan, and which are too short for it.
+    fn fits(&self, sweep: &Sweep<'_>, e: &Estimate) -> (u32, u32) {
+        self.compared(sweep, e).fold((0, 0), |(fits, short), (i, range, expected, sigmas)| {
+            let bit = |is: bool| u32::from(is) << i;
+            (fits | bit((range - expected).abs() < sigmas), short | bit(range < expected - sigmas))
+        })
     }
 }
 

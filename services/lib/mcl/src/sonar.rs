@@ -47,9 +47,20 @@ pub struct Sweep<'a> {
     /// How much of the sweep is news, 0..=1: a drone that stands hears the same things again and again, and what is
     /// wrong with them (something unmapped, a door ajar) is wrong each time.
     pub news: f32,
+    /// Bit i: where reading i has its echo from, something was heard before. If it is too short for the plan, it is no
+    /// reason for doubt.
+    pub familiar: u32,
+    /// Bit i: reading i comes from a door that may be shut where the plan has it open. It says nothing of the place.
+    pub doors: u32,
 }
 
 impl Sweep<'_> {
+    /// The readings that say something of the place, with their indices.
+    pub(crate) fn telling(&self) -> impl Iterator<Item = (usize, &Reading)> {
+        let doors = self.doors;
+        self.readings.iter().take(MAX_READINGS).enumerate().filter(move |(i, _)| doors >> i & 1 == 0)
+    }
+
     /// How much of it is news, whatever was said: 0..=1.
     pub(crate) fn news(&self) -> f32 {
         if self.news.is_nan() { 1.0 } else { self.news.clamp(0.0, 1.0) }
@@ -186,7 +197,15 @@ mod tests {
             mount_x: 0.2,
             mount_y: 0.0,
         };
-        let level = Sweep { readings: &[], roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0, news: 1.0 };
+        let level = Sweep {
+            readings: &[],
+            roll_rad: 0.0,
+            pitch_rad: 0.0,
+            yaw_rad: 0.0,
+            news: 1.0,
+            familiar: 0,
+            doors: 0,
+        };
         let m = model();
         assert_eq!(m.levelled(&reading, &level), Some(Echo::Range(1.0)));
         let down = Reading { elevation_rad: -1.57, ..reading };

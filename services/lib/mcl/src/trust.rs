@@ -5,6 +5,19 @@ use crate::config::{ConfigError, within};
 /// What the readings of a drone that stands say of being lost: what stands beside it is on no plan each time again.
 const STALE: f32 = 0.1;
 
+/// What a reading says of being lost.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Evidence {
+    /// Its likelihood by the set.
+    pub(crate) by_set: f32,
+    /// Its likelihood to one who does not know the place.
+    pub(crate) blind: f32,
+    /// Whether it is shorter than the plan has it.
+    pub(crate) short: bool,
+    /// Whether something was heard there before.
+    pub(crate) familiar: bool,
+}
+
 /// How doubt grows and fades.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrustConfig {
@@ -48,16 +61,15 @@ impl TrustConfig {
         within("trust.recovery_per_s", self.recovery_per_s, 1e-6..=0.5)
     }
 
-    /// P(lost) after `dt` seconds and readings with the given (likelihood by the set, likelihood to one
-    /// who does not know the place, whether it is too short): a two-state hidden Markov chain. Where the readings fit the set
-    /// better than they fit any place, doubt falls; unmapped things raise it by a bounded amount each. Readings that are
-    /// hardly `news` (0..=1) say little, and where nothing moves nobody gets lost.
+    /// P(lost) after `dt` seconds and readings: a two-state hidden Markov chain. Where the readings fit the set
+    /// better than they fit any place, doubt falls; unmapped things raise it by a bounded amount each, and those that were
+    /// heard before not at all. Readings that are hardly `news` (0..=1) say little, and where nothing moves nobody gets lost.
     pub(crate) fn step(
         &self,
         p_lost: f32,
         dt: f32,
         news: f32,
-        evidence: impl Iterator<Item = (f32, f32, bool)>,
+        evidence: impl Iterator<Item = Evidence>,
     ) -> f32 {
         let p = if (0.0..=1.0).contains(&p_lost) { p_lost } else { 0.5 };
         let dt = dt.clamp(0.0, 5.0);
@@ -66,8 +78,12 @@ impl TrustConfig {
             - p * (self.recovery_per_s * dt).min(0.5);
         let p = p.clamp(1e-6, 1.0 - 1e-6);
         let mut odds = (p / (1.0 - p)).ln();
-        for (by_set, blind, short) in evidence {
-            let raise = if short { self.raise_short } else { self.raise };
+        for Evidence { by_set, blind, short, familiar } in evidence {
+            let raise = match (short, familiar) {
+                (false, _) => self.raise,
+                (true, false) => self.raise_short,
+                (true, true) => 0.0,
+            };
             let ratio = (blind.max(1e-6) / by_set.max(1e-6)).ln() * self.temper;
             // What stands beside a drone that stands has had its say.
             let news = if short && ratio > 0.0 { fresh } else { news };
@@ -80,17 +96,18 @@ impl TrustConfig {
 
 #[cfg(test)]
 mod tests {
-    use super::TrustConfig;
+    use super::{Evidence, TrustConfig};
 
-    /// One pair of readings each 60 ms, as (by the set, blind).
-    fn after(seconds: f32, pair: [(f32, f32, bool); 2]) -> f32 {
+    /// One pair of readings each 60 ms, .
+    fn after(seconds: f32, pair: [Evidence; 2]) -> f32 {
         let t = TrustConfig::default();
         (0..(seconds / 0.06) as usize).fold(0.01, |p, _| t.step(p, 0.06, 1.0, pair.into_iter()))
     }
 
-    const HIT: (f32, f32, bool) = (4.0, 0.3, false);
-    const WRONG: (f32, f32, bool) = (0.05, 0.3, false);
-    const SHORT: (f32, f32, bool) = (0.05, 0.3, true);
+    const HIT: Evidence = Evidence { by_set: 4.0, blind: 0.3, short: false, familiar: false };
+    const WRONG: Evidence = Evidence { by_set: 0.05, ..HIT };
+    const SHORT: Evidence = Evidence { short: true, ..WRONG };
+    const FAMILIAR: Evidence = Evidence { familiar: true, ..SHORT };
 
     #[test]
     fn doubt_follows_the_readings() {
@@ -103,13 +120,18 @@ mod tests {
         assert!(after(3.0, [WRONG, WRONG]) > 0.9, "nothing fits for three seconds");
         assert!(after(60.0, [HIT, SHORT]) < 0.01, "half of the readings hit unmapped things for a minute");
         assert!(after(10.0, [SHORT, SHORT]) > 0.9, "nothing fits for ten seconds");
+        assert!(
+            after(60.0, [FAMILIAR, FAMILIAR]) < 0.4,
+            "nothing says that it is lost, and nothing that it is not"
+        );
+        assert!(after(60.0, [FAMILIAR, WRONG]) > 0.9, "what is too long counts whatever stands beside");
         assert!(after(0.3, [WRONG, WRONG]) < 0.5, "a third of a second is a person passing");
     }
 
     #[test]
     fn a_drone_that_waits_beside_something_unmapped_is_not_lost() {
         let t = TrustConfig::default();
-        let waited = |seconds: f32, pair: [(f32, f32, bool); 2]| {
+        let waited = |seconds: f32, pair: [Evidence; 2]| {
             (0..(seconds / 0.06) as usize).fold(0.005, |p, _| t.step(p, 0.06, 0.0, pair.into_iter()))
         };
         assert!(waited(4.0, [SHORT, SHORT]) < 0.05, "{}", waited(4.0, [SHORT, SHORT]));
@@ -120,7 +142,7 @@ mod tests {
     #[test]
     fn broken_evidence_is_doubt() {
         let t = TrustConfig::default();
-        assert!(t.step(0.1, 0.06, 1.0, [(f32::NAN, 0.3, false)].into_iter()) > 0.1);
+        assert!(t.step(0.1, 0.06, 1.0, [Evidence { by_set: f32::NAN, ..HIT }].into_iter()) > 0.1);
         assert!((0.0..=1.0).contains(&t.step(f32::NAN, f32::NAN, f32::NAN, [HIT].into_iter())));
     }
 }

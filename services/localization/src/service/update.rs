@@ -2,6 +2,7 @@
 
 use super::{Believed, Localization};
 use crate::attitude::seconds;
+use crate::clutter::Ear;
 use crate::predict::{Dynamics, predict};
 use crate::set::{MEMORY_GROUNDED, columns, columns_mut};
 use crate::sweep::Group;
@@ -105,8 +106,15 @@ impl Localization {
         };
         let then = self.attitudes.at(time_ns).unwrap_or_default();
         let news = self.news.follow(motion.dt_s, self.velocity.way, then.yaw);
+        let (familiar, doors) = self.believed.zip(group).map_or((0, 0), |(b, g)| {
+            let (ear, table) = (Ear::of(&b.estimate, then.yaw), &self.table);
+            let expected = |x: f32, y: f32, angle: f32| table.range(x, y, angle);
+            (self.clutter.familiar(g.readings(), &ear), self.clutter.doors(g.readings(), &ear, expected))
+        });
         let sweep = group.map(|g| Sweep {
             readings: g.readings(),
+            familiar,
+            doors,
             roll_rad: then.roll - upright[0],
             pitch_rad: then.pitch - upright[1],
             yaw_rad: then.yaw,
@@ -126,6 +134,7 @@ impl Localization {
         }
         if let Some(group) = group {
             self.walls.take(&group.sensors[..group.count], update.fits, time_ns);
+            self.clutter.learn(group.readings(), &Ear::of(&update.estimate, then.yaw), update.short);
         }
         let believed = self.send(now, time_ns, &update, &generator, loan);
         let (e, frames) = (&believed.estimate, self.frames(&believed));

@@ -346,7 +346,15 @@ pub(crate) fn fly(world: &World, trial: &Trial) -> Log {
             })
             .collect();
         group = (group + 1) % 4;
-        let sweep = Sweep { readings: &readings, roll_rad: roll, pitch_rad: pitch, yaw_rad: yaw, news: 1.0 };
+        let sweep = Sweep {
+            readings: &readings,
+            roll_rad: roll,
+            pitch_rad: pitch,
+            yaw_rad: yaw,
+            news: 1.0,
+            familiar: 0,
+            doors: 0,
+        };
         let motion = Motion {
             felt: None,
             dt_s: DT,
