@@ -62,6 +62,8 @@ const ON_ROUTE_M: f32 = 0.25;
 const ENTERING_M: f32 = 0.12;
 /// Free way kept before what is gone round, metres: cruise speed stops in 0.26 m.
 const ROUND_GAP_M: f32 = 0.25;
+/// Between the posts of a door the line has less clearance than this, metres; 1.2 m are the widest.
+const POSTS_M: f32 = 0.55;
 /// Once blocked, the way must be free for this much more, metres.
 const FREE_AGAIN_M: f32 = 0.2;
 /// Less than this much way before the stop is not worth going, metres.
@@ -270,11 +272,13 @@ impl Steering {
         speed = speed.min(self.speed + SPEED_UP_M_S2 * scene.dt_s.clamp(0.0, 0.2));
         self.speed = speed;
         let mut wish = (speed * direction.cos(), speed * direction.sin());
-        // Beside something unmapped the histogram steers, and the line does not pull back.
+        // Beside something unmapped the line does not pull back, but for between the posts of a door: whoever drew it did not
+        // know of the thing.
         let alone = fence.unmapped_m().is_infinite();
+        let held = narrow && (alone || aim.route_m < POSTS_M);
         let entering = scene.field.distance(place.x, place.y) > aim.route_m + ENTERING_M;
         if !self.blocked
-            && (narrow || (aim.aside_m < ON_ROUTE_M && steer.reason == SteeringReason::TargetSafe && alone))
+            && (held || (aim.aside_m < ON_ROUTE_M && steer.reason == SteeringReason::TargetSafe && alone))
         {
             wish = along(&aim, place, speed, entering, wish);
         }

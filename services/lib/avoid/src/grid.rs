@@ -88,6 +88,11 @@ pub struct GridRules {
     pub decay_per_s: f32,
     /// Clearing ends this far before the echo, metres: range noise and half a cell diagonal.
     pub clear_margin_m: f32,
+    /// Nearer to the sensor than [`Self::near_m`] a beam takes no more than this: what is a little lower or higher than the
+    /// sensor is under or over the cone there, and was heard from farther away.
+    pub clear_near: u8,
+    /// There the cone is 13 cm high to either side of its axis, metres.
+    pub near_m: f32,
     /// Half-angle within which an echo clears, radians: half of the cone's 15 degrees, where it is loudest.
     pub clear_half_angle_rad: f32,
 }
@@ -108,6 +113,8 @@ impl Default for GridRules {
             clear_silence: 1,
             decay_per_s: 1.5,
             clear_margin_m: 0.15,
+            clear_near: 2,
+            near_m: 0.5,
             clear_half_angle_rad: 7.5 / 180.0 * PI,
         }
     }
@@ -242,6 +249,7 @@ fn clear_wedge(cells: &mut [u8], window: &Window, rules: &GridRules, beam: &Beam
             let across = (dy * cos - dx * sin).abs();
             // Half a cell beside the axis: next to the sensor the wedge is thinner than a cell.
             if along > 0.0 && along < reach && across <= along * slope + 0.5 * CELL_M {
+                let units = if along < rules.near_m { units.min(rules.clear_near) } else { units };
                 *cell = cell.saturating_sub(units);
             }
         }

@@ -182,7 +182,7 @@ const GRID: usize = 48;
 /// A set wider than this is looked through for clusters, metres.
 const WIDE_M: f32 = 0.35;
 /// Particles this near to the peak belong to it, metres.
-const CLUSTER_M: f32 = 0.75;
+const CLUSTER_M: f32 = 1.0;
 
 /// Finds where most of the weight is; keeps the room that it needs.
 pub(crate) struct Summary {
