@@ -1,5 +1,6 @@
 //! One decision: from the aim on the route to a velocity and a heading.
 
+mod lane;
 mod line;
 
 use crate::config::NavigationConfig;
@@ -64,6 +65,8 @@ const ENTERING_M: f32 = 0.12;
 const ROUND_GAP_M: f32 = 0.25;
 /// Between the posts of a door the line has less clearance than this, metres; 1.2 m are the widest.
 const POSTS_M: f32 = 0.55;
+/// Blocked for so long, seconds, the drone looks for a way past beside the route: who only comes by is gone.
+const LANE_AFTER_S: f32 = 2.0;
 /// Once blocked, the way must be free for this much more, metres.
 const FREE_AGAIN_M: f32 = 0.2;
 /// Less than this much way before the stop is not worth going, metres.
@@ -135,6 +138,7 @@ pub struct Steering {
     heading: f32,
     speed: f32,
     blocked: bool,
+    blocked_s: f32,
 }
 
 impl Steering {
@@ -148,7 +152,16 @@ impl Steering {
             Vfh::new(VfhConfig { clearance_m: craft.radius_m + margin_m, ..flight })
         };
         let (roomy, tight) = (vfh(ROOMY_M)?, vfh(TIGHT_M)?);
-        Ok(Self { roomy, tight, squeezing: false, craft, heading: f32::NAN, speed: 0.0, blocked: false })
+        Ok(Self {
+            roomy,
+            tight,
+            squeezing: false,
+            craft,
+            heading: f32::NAN,
+            speed: 0.0,
+            blocked: false,
+            blocked_s: 0.0,
+        })
     }
 
     /// Starts afresh: the next wished heading is the present one, the speed grows from nothing.
@@ -159,6 +172,7 @@ impl Steering {
         self.heading = f32::NAN;
         self.speed = 0.0;
         self.blocked = false;
+        self.blocked_s = 0.0;
     }
 
     /// Chooses velocity and heading towards the aim (`None`: stand). The histogram is filled in any case.
@@ -246,8 +260,16 @@ impl Steering {
         if !self.blocked {
             steer.direction = direction;
         }
+        self.blocked_s = if self.blocked { self.blocked_s + scene.dt_s.clamp(0.0, 0.2) } else { 0.0 };
+        let (dx, dy) = (aim.onward.0 - aim.foot.0, aim.onward.1 - aim.foot.1);
+        let onward = if dx.hypot(dy) > WORTH_M { dy.atan2(dx) } else { f32::NAN };
+        let past = if self.blocked_s > LANE_AFTER_S && !(narrow && aim.gate) {
+            lane::past(scene, radius_m, onward)
+        } else {
+            None
+        };
 
-        self.turn(config, scene.dt_s, direction);
+        self.turn(config, scene.dt_s, if past.is_some() { onward } else { direction });
         steer.heading = wrap(self.heading + scan(config, scene.now));
         let mut speed = if self.blocked { 0.0 } else { speed };
         speed = speed.min(stoppable_within(gap));
@@ -281,6 +303,10 @@ impl Steering {
             && (held || (aim.aside_m < ON_ROUTE_M && steer.reason == SteeringReason::TargetSafe && alone))
         {
             wish = along(&aim, place, speed, entering, wish);
+        }
+        if let Some(past) = past {
+            (wish, steer.direction, steer.reason) = (past, onward, SteeringReason::NarrowValley);
+            self.speed = past.0.hypot(past.1);
         }
         let (velocity, backing) = fence.keep(wish, Some(target_rad));
         steer.velocity = velocity;
