@@ -65,7 +65,7 @@ const ENTERING_M: f32 = 0.12;
 const ROUND_GAP_M: f32 = 0.25;
 /// Between the posts of a door the line has less clearance than this, metres; 1.2 m are the widest.
 const POSTS_M: f32 = 0.55;
-/// Blocked for so long, seconds, the drone looks for a way past beside the route: who only comes by is gone.
+/// Blocked or led astray for so long, seconds, the drone looks for a way past beside the route: who only comes by is gone.
 const LANE_AFTER_S: f32 = 2.0;
 /// Once blocked, the way must be free for this much more, metres.
 const FREE_AGAIN_M: f32 = 0.2;
@@ -138,7 +138,7 @@ pub struct Steering {
     heading: f32,
     speed: f32,
     blocked: bool,
-    blocked_s: f32,
+    astray_s: f32,
 }
 
 impl Steering {
@@ -160,7 +160,7 @@ impl Steering {
             heading: f32::NAN,
             speed: 0.0,
             blocked: false,
-            blocked_s: 0.0,
+            astray_s: 0.0,
         })
     }
 
@@ -172,7 +172,7 @@ impl Steering {
         self.heading = f32::NAN;
         self.speed = 0.0;
         self.blocked = false;
-        self.blocked_s = 0.0;
+        self.astray_s = 0.0;
     }
 
     /// Chooses velocity and heading towards the aim (`None`: stand). The histogram is filled in any case.
@@ -260,10 +260,12 @@ impl Steering {
         if !self.blocked {
             steer.direction = direction;
         }
-        self.blocked_s = if self.blocked { self.blocked_s + scene.dt_s.clamp(0.0, 0.2) } else { 0.0 };
         let (dx, dy) = (aim.onward.0 - aim.foot.0, aim.onward.1 - aim.foot.1);
         let onward = if dx.hypot(dy) > WORTH_M { dy.atan2(dx) } else { f32::NAN };
-        let past = if self.blocked_s > LANE_AFTER_S && !(narrow && aim.gate) {
+        let astray = self.blocked || wrap(direction - target_rad).abs() > LEADS_AWAY_RAD;
+        let dt_s = scene.dt_s.clamp(0.0, 0.2);
+        self.astray_s = (self.astray_s + if astray { dt_s } else { -dt_s }).clamp(0.0, LANE_AFTER_S + 1.0);
+        let past = if astray && self.astray_s > LANE_AFTER_S && !(narrow && aim.gate) {
             lane::past(scene, radius_m, onward)
         } else {
             None

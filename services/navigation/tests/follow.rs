@@ -89,6 +89,36 @@ fn a_box_that_is_not_on_the_plan_is_flown_around() {
 }
 
 #[test]
+fn a_gap_of_eighty_centimetres_beside_a_cupboard_is_passed() {
+    let rows = [
+        "########################################################################",
+        "#                                                                      #",
+        "#                                                                      #",
+        "#                                                                      #",
+        "#                                                                      #",
+        "#                                 ooooooo                              #",
+        "#                                 ooooooo                              #",
+        "#                                 ooooooo                              #",
+        "#                                 ooooooo                              #",
+        "#                                 ooooooo                              #",
+        "#        S                        ooooooo                    T         #",
+        "#                                 ooooooo                              #",
+        "#                                                                      #",
+        "#                                                                      #",
+        "#                                                                      #",
+        "#                                                                      #",
+        "#                                                                      #",
+        "#                                                                      #",
+        "#                                                                      #",
+        "#                                                                      #",
+        "########################################################################",
+    ];
+    let flown = follow(&world(&rows, 0.1), &[find(&rows, 'S', 0.1), find(&rows, 'T', 0.1)], 60.0);
+    assert!(flown.arrived, "{:?}", flown.path.last());
+    assert!(flown.least_gap > 0.08, "{}", flown.least_gap);
+}
+
+#[test]
 fn a_wall_across_the_corridor_that_is_not_on_the_plan_stops_the_drone_in_time() {
     let rows = [
         "############################################################",
