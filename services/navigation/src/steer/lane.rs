@@ -8,10 +8,10 @@ use super::{STANDS_CERTAINTY, Scene};
 use avoid::swath::for_each_certain;
 
 /// Strips, so far apart, metres: 0.5 m to either side.
-const LANES: usize = 21;
-const APART_M: f32 = 0.05;
+const LANES: usize = 41;
+const APART_M: f32 = 0.025;
 /// Free on either side of the airframe, metres: of what the sonars have seen, which cones make wider, and of the plan.
-const SEEN_M: f32 = 0.07;
+const SEEN_M: f32 = 0.05;
 const MAPPED_M: f32 = 0.07;
 /// A strip is free when nothing stands in it for so long, metres.
 const LONG_M: f32 = 1.3;
@@ -78,8 +78,8 @@ mod tests {
             nearest_run(&free)
         };
         assert_eq!(runs(&[]), None);
-        assert_eq!(runs(&[0..=20]), Some((0, 20)));
-        assert_eq!(runs(&[0..=4, 13..=15]), Some((13, 15)));
-        assert_eq!(runs(&[6..=8, 13..=20]), Some((6, 8)));
+        assert_eq!(runs(&[0..=40]), Some((0, 40)));
+        assert_eq!(runs(&[0..=14, 23..=25]), Some((23, 25)));
+        assert_eq!(runs(&[16..=18, 23..=40]), Some((16, 18)));
     }
 }
