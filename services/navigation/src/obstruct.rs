@@ -13,6 +13,8 @@ const DOOR_M: f32 = 0.35;
 /// What is marked for the rest of the round was heard twice in one place.
 const SURE_CERTAINTY: u8 = 16;
 /// Half of the stretch stamped when nothing was seen and still there was no progress, metres.
+/// A drone nearer than this to the line between the posts would have the leaf in its propellers, metres.
+const IN_DOOR_M: f32 = 0.4;
 const UNSEEN_HALF_M: f32 = 0.15;
 
 impl Journey {
@@ -35,7 +37,7 @@ impl Journey {
             }
         });
         if nearest.is_finite() {
-            self.shut_door(place.x + nearest * cos, place.y + nearest * sin);
+            self.shut_door(place, place.x + nearest * cos, place.y + nearest * sin);
         } else {
             nearest = self.map.limits().radius_m + UNSEEN_HALF_M;
             for aside in [-UNSEEN_HALF_M, 0.0, UNSEEN_HALF_M] {
@@ -48,9 +50,12 @@ impl Journey {
         self.count_try();
     }
 
-    /// What was seen in a door is the door.
-    fn shut_door(&mut self, x: f32, y: f32) {
+    /// What was seen in a door is the door, unless the drone itself stands in it.
+    fn shut_door(&mut self, place: &Place, x: f32, y: f32) {
         let Some(door) = self.map.door_near(x, y, DOOR_M) else { return };
+        if self.map.doors().get(door).is_some_and(|door| door.distance(place.x, place.y) < IN_DOOR_M) {
+            return;
+        }
         self.map.set_door(door, true);
         if let Some(times) = self.found_shut.get_mut(door) {
             *times += 1;

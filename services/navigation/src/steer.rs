@@ -63,6 +63,8 @@ const ON_ROUTE_M: f32 = 0.25;
 const ENTERING_M: f32 = 0.12;
 /// Free way kept before what is gone round, metres: cruise speed stops in 0.26 m.
 const ROUND_GAP_M: f32 = 0.25;
+/// Farther than this behind the narrowest place, metres, is behind the door and not in it.
+const BEHIND_M: f32 = 0.5;
 /// Between the posts of a door the line has less clearance than this, metres; 1.2 m are the widest.
 const POSTS_M: f32 = 0.55;
 /// Blocked or led astray for so long, seconds, the drone looks for a way past beside the route: who only comes by is gone.
@@ -239,12 +241,18 @@ impl Steering {
         // Between mapped walls the planned line is known to 3 cm, and the valley is only a few sectors wide:
         // the line is flown while nothing stands on it.
         let narrow = aim.route_m < config.narrow_m && aim.aside_m < ON_ROUTE_M;
+        // What stands behind a door is gone round from behind the door.
+        let behind = aim.gate_m.is_some_and(|gate| on_line > gate + BEHIND_M);
+        let near = self.craft.radius_m + ROUND_GAP_M.min(config.stop_gap_m);
+        let reserve = if narrow && behind { near } else { reserve };
         let (direction, speed, reason, free_m) = match decision.direction_rad {
             _ if narrow && on_line - reserve > wanted => {
                 (target_rad, self.craft.cruise_m_s, SteeringReason::TargetSafe, on_line)
             }
             // A valley beside what stands in a door leads nowhere.
-            _ if narrow && aim.gate => (target_rad, 0.0, SteeringReason::Blocked, on_line),
+            _ if narrow && aim.gate_m.is_some() && !behind => {
+                (target_rad, 0.0, SteeringReason::Blocked, on_line)
+            }
             Some(direction) => {
                 (direction, decision.speed_m_s, reason_of(decision.reason), free(direction, margin_m))
             }
@@ -253,7 +261,7 @@ impl Steering {
         steer.free_m = free_m;
         // What is gone round has a side to pass on: it may be nearer than what is waited for.
         let round = matches!(reason, SteeringReason::NarrowValley | SteeringReason::WideValley);
-        let reserve = if round { self.craft.radius_m + ROUND_GAP_M.min(config.stop_gap_m) } else { reserve };
+        let reserve = if round { near } else { reserve };
         let gap = free_m - reserve;
         self.blocked = gap <= wanted || reason == SteeringReason::Blocked;
         steer.reason = if self.blocked { SteeringReason::Blocked } else { reason };
@@ -265,7 +273,7 @@ impl Steering {
         let astray = self.blocked || wrap(direction - target_rad).abs() > LEADS_AWAY_RAD;
         let dt_s = scene.dt_s.clamp(0.0, 0.2);
         self.astray_s = (self.astray_s + if astray { dt_s } else { -dt_s }).clamp(0.0, LANE_AFTER_S + 1.0);
-        let past = if astray && self.astray_s > LANE_AFTER_S && !(narrow && aim.gate) {
+        let past = if astray && self.astray_s > LANE_AFTER_S && !(narrow && aim.gate_m.is_some()) {
             lane::past(scene, radius_m, onward)
         } else {
             None

@@ -39,8 +39,9 @@ pub struct Aim {
     pub clearance_m: f32,
     /// Least clearance of the route between here and there, metres.
     pub route_m: f32,
-    /// The narrowest place there has a wall to either side, like a door: what stands in it is not gone round.
-    pub gate: bool,
+    /// How far it is to the narrowest place there, metres, if it has a wall to either side like a door: what stands in it is
+    /// not gone round.
+    pub gate_m: Option<f32>,
     /// Distance of the drone from the route, metres.
     pub aside_m: f32,
     /// The place of the route that is nearest to the drone, and one a little further on: its direction.
@@ -81,12 +82,13 @@ impl Steering {
                     y,
                     clearance_m: route.min(line),
                     route_m: route,
-                    gate: gate(
+                    gate_m: gate(
                         field,
                         sample(narrowest.saturating_sub(1)),
                         sample(narrowest),
                         sample((narrowest + 1).min(AIM_SAMPLES)),
-                    ),
+                    )
+                    .then(|| place.distance(sample(narrowest))),
                     aside_m: track.aside(),
                     foot: track.at(track.along()),
                     onward: track.aim(ONWARD_M),
