@@ -97,6 +97,8 @@ const FORGET_M_S: f32 = 0.04;
 /// floors; at least five times the noise over floors.
 const BEAM_GATE_M: f32 = 0.2;
 const BEAM_LEAST_GATE_M: f32 = 0.08;
+/// Things lower than this are no step to a beam that misses as over a carpet, metres.
+const LOW_THING_M: f32 = 0.35;
 /// And between them so many of its mean misses: five standard deviations.
 const BEAM_MISSES: f32 = 4.0;
 /// What misses by more than that and less than a level passes (the rim of a trolley's bed) or stays for so long, seconds:
@@ -261,7 +263,9 @@ impl HeightEstimator {
         if error.abs() <= gate {
             self.doubts = Doubts::default();
             // The noise of the climb rate goes with noise times bandwidth to the power of 3/2.
-            let calm = (BEAM_SURE_M / self.beam_m.max(BEAM_SURE_M)).powf(2.0 / 3.0);
+            // Over the first centimetres of a carpet two readings in a row tell that they are not worth as much any more.
+            let noise = self.beam_m.max(MISS_OF_DIFFERENCE * differs);
+            let calm = (BEAM_SURE_M / noise.max(BEAM_SURE_M)).powf(2.0 / 3.0);
             self.correct(at_ns, gap, error, self.config.bandwidth_rad_s * calm);
             return Echo::Used;
         }
@@ -274,7 +278,11 @@ impl HeightEstimator {
         }
         let level = self.surface_m - mean;
         let off_a_low_one = self.surface_m > 0.0 && level.abs() <= gate;
-        if mean.abs() > BEAM_GATE_M || off_a_low_one {
+        // Over a carpet a few readings may agree by chance and carry the height off. What seems to be a low thing below is
+        // more often that, and whoever takes one for it climbs, which does no harm; the other way round it would sink.
+        let low_thing =
+            self.surface_m <= THIN_M && self.beam_m > BEAM_SURE_M && (-LOW_THING_M..0.0).contains(&mean);
+        if (mean.abs() > BEAM_GATE_M && !low_thing) || off_a_low_one {
             self.surface_m = if level.abs() <= BEAM_GATE_M { 0.0 } else { level };
             self.doubts = Doubts::default();
             self.last_echo_ns = at_ns;
