@@ -129,12 +129,16 @@ proptest! {
     #[test]
     fn a_lost_byte_costs_one_frame(first in any_frame(), second in any_frame(), at in any::<prop::sample::Index>()) {
         let mut stream = bytes_of(&first);
-        stream.remove(at.index(stream.len()));
+        let at = at.index(stream.len());
+        stream.remove(at);
+        // Where the check byte that was lost is itself a `$`, the next frame's stands in its place: the stream
+        // is the one of a first frame that is whole and a second that lost its head, and the second is the cost.
+        let intact = if at == stream.len() && bytes_of(&first).ends_with(b"$") { &first } else { &second };
         stream.extend(bytes_of(&second));
         stream.extend(std::iter::repeat_n(0, ROOM));
         let found = decode(&stream);
         let collided = found.iter().any(|read| *read != first && *read != second);
-        prop_assert!(found.contains(&second) || collided);
+        prop_assert!(found.contains(intact) || collided);
     }
 }
 
