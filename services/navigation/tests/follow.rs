@@ -146,6 +146,30 @@ fn a_wall_across_the_corridor_that_is_not_on_the_plan_stops_the_drone_in_time() 
 }
 
 #[test]
+fn what_stands_behind_a_door_is_gone_round_from_behind_the_door() {
+    // A box of 0.4 m, 1.1 m behind the door, on the line, in a room that is 2 m longer.
+    let rows: Vec<String> = DOOR
+        .iter()
+        .enumerate()
+        .map(|(row, line)| {
+            let longer = format!(
+                "{}{}",
+                &line[..line.len() - 1],
+                if line.starts_with("##") { "#" } else { " " }.repeat(20)
+            );
+            let there = |column: usize| (11..15).contains(&row) && (33..37).contains(&column);
+            let boxed = longer.chars().enumerate().map(|(column, c)| if there(column) { 'o' } else { c });
+            boxed.chain(['#']).collect()
+        })
+        .collect();
+    let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+    let (s, y) = (find(DOOR, 'S', 0.1), find(DOOR, 'T', 0.1).1);
+    let flown = follow(&world(&rows, 0.1), &[s, (1.6, y), (2.7, y), (5.0, y)], 60.0);
+    assert!(flown.arrived, "{:?}", flown.path.last());
+    assert!(flown.least_gap > 0.08, "{}", flown.least_gap);
+}
+
+#[test]
 fn a_shut_door_stops_the_drone_in_time() {
     let rows: Vec<String> = DOOR
         .iter()

@@ -184,6 +184,46 @@ fn a_place_that_stays_lost_brings_it_down_level() {
 }
 
 #[test]
+fn who_is_not_sure_of_its_place_turns_to_and_fro_in_the_hover() {
+    let mut rig = Rig::new(5);
+    rig.run(1.5);
+    rig.navigate(SetpointKind::Velocity, Vector::new(0.2, 0.0), NAN);
+    rig.order(Verb::PatrolStart);
+    rig.run(12.0);
+    rig.pose_state = LocalizationState::Lost;
+    rig.run(1.5);
+    let (place, from) = (rig.place, rig.heading);
+    let (mut least, mut most) = (0.0f32, 0.0f32);
+    for _ in 0..150 {
+        rig.run(0.1);
+        let turned = control::wrap_angle(rig.heading - from);
+        (least, most) = (least.min(turned), most.max(turned));
+    }
+    assert_eq!(rig.state.action, FailsafeAction::Hover.code());
+    assert!(most > 0.5 && least < -0.5 && most - least < 2.0, "{least} {most}");
+    assert!((rig.place - place).norm() < 1.0, "{:?}", rig.place - place);
+    rig.pose_state = LocalizationState::Tracking;
+    rig.run(1.5);
+    assert_eq!(rig.state.action, FailsafeAction::None.code(), "found again, it goes on");
+}
+
+#[test]
+fn a_hover_that_flow_holds_needs_no_walls_and_one_adrift_comes_down() {
+    let lost = |adrift: bool, seconds: f32| {
+        let mut rig = Rig::new(6);
+        rig.take_off();
+        rig.run(10.0);
+        (rig.pose_state, rig.walls_in_echo) = (LocalizationState::Lost, 1);
+        rig.adrift_ns = if adrift { rig.now } else { 0 };
+        rig.run(seconds);
+        rig.phase()
+    };
+    assert_eq!(lost(false, 10.0), Phase::Hover);
+    assert_eq!(lost(true, 2.5), Phase::Hover, "`failsafe.drift_land_s` is 3 s");
+    assert_eq!(lost(true, 4.5), Phase::EmergencyLanding);
+}
+
+#[test]
 fn a_silent_down_sonar_is_held_then_descended_blind() {
     for seed in 0..5 {
         let mut rig = Rig::new(seed);

@@ -97,6 +97,9 @@ pub(crate) struct Rig {
     pub(crate) localization_dead: bool,
     pub(crate) level_known: bool,
     pub(crate) pose_state: LocalizationState,
+    pub(crate) walls_in_echo: u32,
+    /// Since when nothing holds the velocity; zero: flow does.
+    pub(crate) adrift_ns: u64,
     pub(crate) link_state: LinkState,
     pub(crate) blocks: u32,
     pub(crate) cell_volts: f32,
@@ -149,6 +152,8 @@ impl Rig {
             localization_dead: false,
             level_known: false,
             pose_state: LocalizationState::Tracking,
+            walls_in_echo: 4,
+            adrift_ns: 0,
             link_state: LinkState::Up,
             blocks: 0,
             cell_volts: 4.0,

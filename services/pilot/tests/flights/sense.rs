@@ -88,7 +88,8 @@ impl Rig {
                 level_pitch_rad: known.pitch,
                 p_lost: 0.001,
                 state: self.pose_state.code().into(),
-                walls_in_echo: 4,
+                walls_in_echo: self.walls_in_echo,
+                adrift_ns: self.adrift_ns,
                 ..Default::default()
             });
         }
