@@ -46,8 +46,9 @@ pub struct Person {
     /// The corner that is walked to, and the direction along the list.
     target: usize,
     forward: bool,
-    /// Seconds still to stand; seconds waited for the drone.
+    /// Seconds still to stand; whether it is for the drone, and the patience used up on it, seconds.
     standing: f32,
+    halted: bool,
     waited: f32,
 }
 
@@ -61,7 +62,7 @@ impl Person {
     /// Whether the person has a step to make now, rather than standing.
     #[must_use]
     pub fn walks(&self) -> bool {
-        self.standing <= 0.0 && self.waited <= 0.0 && self.way.len() > 1
+        self.standing <= 0.0 && !self.halted && self.way.len() > 1
     }
 
     /// The person as a solid: a coat, and soft.
@@ -113,7 +114,8 @@ impl Person {
         let (ux, uy) = (dx / left, dy / left);
         let (ex, ey) = (drone.0 - self.x, drone.1 - self.y);
         let away = ex.hypot(ey);
-        if away < STOP_M && ex * ux + ey * uy > AHEAD_COS * away {
+        self.halted = away < STOP_M && ex * ux + ey * uy > AHEAD_COS * away;
+        if self.halted {
             self.waited += dt;
             if self.waited > PATIENCE_S {
                 self.waited = 0.0;
@@ -121,7 +123,8 @@ impl Person {
             }
             return;
         }
-        self.waited = 0.0;
+        // A step made because the drone swayed is no walk: patience comes back as slowly as it goes.
+        self.waited = (self.waited - dt).max(0.0);
         self.x += ux * stride;
         self.y += uy * stride;
     }
@@ -207,6 +210,7 @@ fn person<R: Rng + ?Sized>(
         target: start,
         forward: true,
         standing: 0.0,
+        halted: false,
         waited: 0.0,
     };
     person.next();
@@ -230,6 +234,7 @@ mod tests {
             target: 1,
             forward: true,
             standing: 0.0,
+            halted: false,
             waited: 0.0,
         }
     }
@@ -259,5 +264,16 @@ mod tests {
             furthest = furthest.max(crowd.people[0].x);
         }
         assert!(furthest < 1.25 && crowd.people[0].x < 1.0, "{furthest} {}", crowd.people[0].x);
+    }
+
+    #[test]
+    fn a_drone_that_sways_wears_patience_out_like_one_that_stands() {
+        let mut crowd = Crowd { people: vec![walker_along_x()], now_s: 0.0 };
+        for tick in 1..=400 {
+            // 3 cm to and fro, once in two seconds.
+            let sway = 0.03 * (f32::from(tick as u16) * 0.02 * core::f32::consts::PI).sin();
+            crowd.advance(f64::from(tick) * 0.02, (2.0 + sway, 0.0));
+        }
+        assert!(crowd.people[0].x < 0.8, "{}", crowd.people[0].x);
     }
 }
