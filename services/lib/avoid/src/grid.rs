@@ -109,7 +109,7 @@ impl Default for GridRules {
         Self {
             reading: UNITS_PER_READING,
             most: 6 * UNITS_PER_READING,
-            clear_echo: 6,
+            clear_echo: 3,
             clear_silence: 1,
             decay_per_s: 1.5,
             clear_margin_m: 0.15,
