@@ -12,9 +12,9 @@ const BESIDE_M: f32 = 0.45;
 const DOOR_M: f32 = 0.35;
 /// What is marked for the rest of the round was heard twice in one place.
 const SURE_CERTAINTY: u8 = 16;
-/// Half of the stretch stamped when nothing was seen and still there was no progress, metres.
 /// A drone nearer than this to the line between the posts would have the leaf in its propellers, metres.
 const IN_DOOR_M: f32 = 0.4;
+/// Half of the stretch stamped when nothing was seen and still there was no progress, metres.
 const UNSEEN_HALF_M: f32 = 0.15;
 
 impl Journey {

@@ -116,6 +116,11 @@ impl Bits {
         &self.words
     }
 
+    /// Whether any bit is set.
+    pub fn any(&self) -> bool {
+        self.words.iter().any(|word| *word != 0)
+    }
+
     /// The bit of a cell.
     pub fn get(&self, raster: &Raster, cell: usize) -> bool {
         let (word, bit) = place(raster, cell);

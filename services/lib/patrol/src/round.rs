@@ -311,7 +311,9 @@ impl Round {
                 .raster()
                 .cell(self.planner.goal().0, self.planner.goal().1)
                 .is_some_and(|c| self.reached[c]);
-            self.rooms[room].skipped = self.planner.obstacle().or(barred.then_some(Obstacle::Unmapped));
+            let marked = map.unmapped().any();
+            let bar = if marked { Obstacle::Unmapped } else { Obstacle::NoWay };
+            self.rooms[room].skipped = self.planner.obstacle().or(barred.then_some(bar));
             self.asked = false;
             self.stage = next;
         }

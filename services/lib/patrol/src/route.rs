@@ -246,7 +246,17 @@ fn obstacle(map: &Costmap, start: usize, path: &[usize]) -> Option<Obstacle> {
     let narrow = bad.iter().copied().filter(|cell| map.is_narrow(*cell) && !map.is_obstructed(*cell));
     let needed_m = 2.0 * map.limits().clearance_m();
     let narrowest = narrow.min_by(|a, b| map.mapped(*a).total_cmp(&map.mapped(*b)));
-    // Along the wall of a passage that is wide enough leads only what something in its middle has pushed aside.
-    let width = narrowest.map(|cell| map.passage_width(cell)).filter(|width| *width < needed_m);
-    Some(width.map_or(Obstacle::Unmapped, |width_m| Obstacle::Narrow { width_m, needed_m }))
+    let Some(cell) = narrowest else { return Some(Obstacle::Unmapped) };
+    let width_m = map.passage_width(cell);
+    if width_m < needed_m {
+        return Some(Obstacle::Narrow { width_m, needed_m });
+    }
+    // Along the wall of a passage that is wide enough leads only what something in its middle has pushed aside; where nothing
+    // is marked, the passage is crooked, and as wide as there is room about its narrowest place.
+    let aside = bad.iter().any(|cell| map.is_obstructed(*cell)) || map.unmapped().any();
+    Some(if aside {
+        Obstacle::Unmapped
+    } else {
+        Obstacle::Narrow { width_m: 2.0 * map.mapped(cell), needed_m }
+    })
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{draw, fly_all, length, plan_round, scanned, score};
-use patrol::Seen;
+use patrol::{Obstacle, Seen};
 
 /// Coverage and a picture of the flight; nothing when the plans are not there.
 fn coverage(name: &str) -> Option<(f64, String)> {
@@ -31,5 +31,15 @@ fn the_depot_is_covered() {
 fn the_room_of_pillars_is_covered() {
     if let Some((coverage, picture)) = coverage("turtlebot3_world") {
         assert!(coverage >= 0.95, "{picture}\n{coverage}");
+    }
+}
+
+#[test]
+fn on_a_plan_without_marks_nothing_is_blamed_on_what_is_not_on_the_plan() {
+    for (name, pad) in [("willow-full-0.05", Some((10.0, 15.0))), ("depot", None)] {
+        let Some(site) = scanned(name) else { continue };
+        let round = plan_round(&site, pad.unwrap_or(site.pad), &Seen::new(&site.map));
+        let skipped: Vec<_> = round.rooms().iter().filter_map(|room| room.skipped).collect();
+        assert!(!skipped.contains(&Obstacle::Unmapped), "{name}: {skipped:?}");
     }
 }
