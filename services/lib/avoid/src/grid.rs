@@ -104,7 +104,7 @@ pub const UNITS_PER_READING: u8 = 8;
 impl Default for GridRules {
     /// The `flight` configuration: six readings saturate, so that what moved on is cleared by a handful of
     /// pings (about 2 s at 4 Hz a sensor); a full cell is forgotten in 32 s, because who stands between two cones
-    /// is heard by neither; an echo from behind takes three quarters of a reading away.
+    /// is heard by neither; an echo from behind takes three eighths of a reading away, for a coat swallows every fifth ping.
     fn default() -> Self {
         Self {
             reading: UNITS_PER_READING,
@@ -292,11 +292,32 @@ mod tests {
             for _ in 0..3 {
                 insert(&mut cells, &window, &rules, &beam(0.0, 0.0, 30.0, Echo::Obstacle(1.0)));
             }
-            for _ in 0..4 {
+            // Three readings of 8 units, and 3 units an echo from behind.
+            for _ in 0..8 {
                 insert(&mut cells, &window, &rules, &beam(0.0, 0.0, 30.0, Echo::Obstacle(3.0)));
             }
             assert_eq!(cells.iter().all(|c| *c == 0), gone);
         }
+    }
+
+    #[test]
+    fn one_echo_from_behind_takes_less_than_a_reading_and_near_the_sensor_less_still() {
+        let window = Window::around(0.0, 0.0).unwrap();
+        let left = |distance: f32| {
+            let mut cells = vec![0u8; CELLS];
+            insert(
+                &mut cells,
+                &window,
+                &GridRules::default(),
+                &beam(0.0, 0.0, 30.0, Echo::Obstacle(distance)),
+            );
+            insert(&mut cells, &window, &GridRules::default(), &beam(0.0, 0.0, 30.0, Echo::Obstacle(3.0)));
+            cells.iter().copied().max().unwrap()
+        };
+        // A coat swallows every fifth ping: whoever answered once is still there after one ping past him.
+        assert_eq!(left(1.0), UNITS_PER_READING - 3);
+        // What is a little lower than the sensor is under the cone near by, and was heard from farther away.
+        assert_eq!(left(0.3), UNITS_PER_READING - 2);
     }
 
     #[test]
