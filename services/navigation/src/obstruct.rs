@@ -26,6 +26,7 @@ impl Journey {
         }
         let (sin, cos) = towards.sin_cos();
         let mut nearest = f32::INFINITY;
+        let (mut heard, mut in_door, mut there) = (0u32, 0u32, (0.0, 0.0));
         let map = &mut self.map;
         for_each_certain(cells, SURE_CERTAINTY, |index| {
             let (x, y) = window.centre(index);
@@ -34,10 +35,17 @@ impl Journey {
             if along > 0.0 && along < AHEAD_M && aside.abs() < BESIDE_M {
                 map.mark_unmapped(x, y);
                 nearest = nearest.min(along);
+                heard += 1;
+                if map.door_near(x, y, DOOR_M).is_some() {
+                    (in_door, there) = (in_door + 1, (x, y));
+                }
             }
         });
         if nearest.is_finite() {
-            self.shut_door(place, place.x + nearest * cos, place.y + nearest * sin);
+            // A cone enters some of what it hears of a leaf before or behind it.
+            let (x, y) =
+                if 2 * in_door >= heard { there } else { (place.x + nearest * cos, place.y + nearest * sin) };
+            self.shut_door(place, x, y);
         } else {
             nearest = self.map.limits().radius_m + UNSEEN_HALF_M;
             for aside in [-UNSEEN_HALF_M, 0.0, UNSEEN_HALF_M] {

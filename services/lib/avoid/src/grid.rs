@@ -102,8 +102,8 @@ pub struct GridRules {
 pub const UNITS_PER_READING: u8 = 8;
 
 impl Default for GridRules {
-    /// The `flight` configuration: six readings saturate, so that what moved on is cleared by a handful of
-    /// pings (about 2 s at 4 Hz a sensor); a full cell is forgotten in 32 s, because who stands between two cones
+    /// The `flight` configuration: six readings saturate, so that what moved on is cleared by sixteen
+    /// pings (3 s at 5.6 Hz a sensor); a full cell is forgotten in 32 s, because who stands between two cones
     /// is heard by neither; an echo from behind takes three eighths of a reading away, for a coat swallows every fifth ping.
     fn default() -> Self {
         Self {

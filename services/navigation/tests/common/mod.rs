@@ -19,11 +19,7 @@ use navigation::track::Track;
 
 pub const RADIUS_M: f32 = 0.225;
 pub const STEP_NS: u64 = 50_000_000;
-/// As on `watchman`: where the sonars look, degrees; how far from the middle they sit, metres; who is fired together, and how
-/// often a group is.
-const BEARINGS_DEG: [f32; 8] = [0.0, 35.0, 75.0, 125.0, 180.0, 235.0, 285.0, 325.0];
-const MOUNT_M: f32 = 0.06;
-const GROUPS: [&[u8]; 3] = [&[0, 3, 5], &[1, 4, 6], &[2, 7]];
+/// Eight around, opposite pairs together, 60 ms a group: as `watchman`.
 const GROUP_NS: u64 = 60_000_000;
 
 /// The true world and what the plan says of it.
@@ -68,10 +64,10 @@ impl World {
 
     /// What the sonar at this body bearing hears.
     pub fn reading(&self, now: u64, sensor: u8, x: f32, y: f32, heading: f32) -> SonarReading {
-        let bearing = wrap(BEARINGS_DEG[usize::from(sensor)].to_radians());
-        let (mx, my) = (MOUNT_M * bearing.cos(), MOUNT_M * bearing.sin());
+        let bearing = wrap(f32::from(sensor) * std::f32::consts::FRAC_PI_4);
+        let (mx, my) = (0.2 * bearing.cos(), 0.2 * bearing.sin());
         let angle = heading + bearing;
-        let (fx, fy) = (x + MOUNT_M * angle.cos(), y + MOUNT_M * angle.sin());
+        let (fx, fy) = (x + 0.2 * angle.cos(), y + 0.2 * angle.sin());
         let nearest = (-7..=7)
             .filter_map(|k| self.truth.cast_ray(fx, fy, angle + (k as f32 * 15.0 / 7.0).to_radians(), 4.0))
             .filter(|hit| hit.incidence_rad < 30.0_f32.to_radians())
@@ -94,8 +90,9 @@ impl World {
     pub fn readings(&self, now: u64, x: f32, y: f32, heading: f32) -> Vec<SonarReading> {
         let mut all = Vec::new();
         for slot in (now - STEP_NS) / GROUP_NS + 1..=now / GROUP_NS {
-            for sensor in GROUPS[slot as usize % GROUPS.len()] {
-                all.push(self.reading(slot * GROUP_NS, *sensor, x, y, heading));
+            let group = (slot % 4) as u8;
+            for sensor in [group, group + 4] {
+                all.push(self.reading(slot * GROUP_NS, sensor, x, y, heading));
             }
         }
         all
