@@ -29,6 +29,8 @@ const CENTRE_PER_S: f32 = 1.0;
 const CENTRE_MOST_M_S: f32 = 0.15;
 /// What lies within 45 degrees of a direction lies that way, as a cosine.
 const THAT_WAY_COS: f32 = 0.7;
+/// What lies more than 105 degrees off a motion is left behind by it, as a cosine.
+const LEFT_BEHIND_COS: f32 = -0.26;
 /// Slower wishes are standing, metres a second.
 const STANDS_M_S: f32 = 0.02;
 /// Passes over the directions; two opposite ones that are too near settle in the middle.
@@ -43,6 +45,8 @@ pub struct Fence {
     sides: [(f32, f32, f32); DIRECTIONS],
     least_m: f32,
     unmapped_m: f32,
+    /// The same for what does not lie behind a motion that way.
+    unmapped_sides: [f32; DIRECTIONS],
 }
 
 impl Fence {
@@ -51,7 +55,8 @@ impl Fence {
     pub fn around(scene: &Scene<'_>, radius_m: f32) -> Self {
         let mut nearest = [f32::INFINITY; DIRECTIONS];
         let mut unmapped = f32::INFINITY;
-        let mut note = |angle: f32, distance: f32| {
+        let mut unmapped_sides = [f32::INFINITY; DIRECTIONS];
+        let note = |nearest: &mut [f32; DIRECTIONS], angle: f32, distance: f32| {
             if angle.is_finite() && distance < REACH_M {
                 let side = (angle / TAU * DIRECTIONS as f32).round() as i32;
                 if let Some(slot) = nearest.get_mut(side.rem_euclid(DIRECTIONS as i32) as usize) {
@@ -71,26 +76,40 @@ impl Fence {
                     let (cx, cy) = scene.window.centre(index);
                     let distance = (cx - x).hypot(cy - y);
                     unmapped = unmapped.min(distance);
-                    note((cy - y).atan2(cx - x), distance);
+                    note(&mut unmapped_sides, (cy - y).atan2(cx - x), distance);
                 }
             }
         }
         for (bearing, distance) in scene.senses.near(scene.now, ECHO_AGE_S) {
-            note(scene.place.heading + bearing, distance);
+            note(&mut nearest, scene.place.heading + bearing, distance);
         }
+        for (side, unmapped) in nearest.iter_mut().zip(unmapped_sides) {
+            *side = side.min(unmapped);
+        }
+        let unmapped_sides = unmapped_sides.map(|distance| distance - radius_m);
         let mut sides = [(0.0, 0.0, f32::INFINITY); DIRECTIONS];
         for (i, (side, seen)) in sides.iter_mut().zip(nearest).enumerate() {
             let (sin, cos) = (i as f32 * TAU / DIRECTIONS as f32).sin_cos();
             *side = (cos, sin, seen.min(wall(scene, cos, sin)) - radius_m);
         }
         let least_m = sides.iter().fold(f32::INFINITY, |least, side| least.min(side.2));
-        Self { sides, least_m, unmapped_m: unmapped - radius_m }
+        Self { sides, least_m, unmapped_m: unmapped - radius_m, unmapped_sides }
     }
 
     /// The least gap to what no plan shows, metres; infinite when nothing of the kind is near.
     #[must_use]
     pub fn unmapped_m(&self) -> f32 {
         self.unmapped_m
+    }
+
+    /// The least gap to what no plan shows and what is not left behind by a motion in a direction, metres; infinite when
+    /// nothing of the kind is near.
+    #[must_use]
+    pub fn unmapped_towards_m(&self, direction: f32) -> f32 {
+        let (sin, cos) = direction.sin_cos();
+        let sides = self.sides.iter().zip(self.unmapped_sides);
+        let ahead = sides.filter(|(side, _)| side.0 * cos + side.1 * sin > LEFT_BEHIND_COS);
+        ahead.fold(f32::INFINITY, |least, (_, gap)| least.min(gap))
     }
 
     /// Motion to the middle between what is on the left and on the right of a wish. Without one the drone makes room on all
@@ -162,7 +181,7 @@ mod tests {
             *side = (cos, sin, gap);
         }
         let least_m = gaps.iter().fold(f32::INFINITY, |least, (_, gap)| least.min(*gap));
-        Fence { sides, least_m, unmapped_m: f32::INFINITY }
+        Fence { sides, least_m, unmapped_m: f32::INFINITY, unmapped_sides: [f32::INFINITY; DIRECTIONS] }
     }
 
     #[test]
@@ -200,6 +219,17 @@ mod tests {
         assert!((aside.0 - back(ROOM_M, 0.25)).abs() < 1e-4, "{aside:?}");
         // Walls alone do not move it: the planned line keeps to their middle.
         assert_eq!(fence(&[(0, 0.25)]).keep((0.0, 0.0), None).0, (0.0, 0.0));
+    }
+
+    #[test]
+    fn what_is_left_behind_costs_no_speed() {
+        let mut sides = [f32::INFINITY; DIRECTIONS];
+        // 0.2 m behind a motion along x, 0.3 m to its left.
+        (sides[12], sides[6]) = (0.2, 0.3);
+        let fence = Fence { unmapped_sides: sides, ..fence(&[]) };
+        assert_eq!(fence.unmapped_towards_m(0.0), 0.3);
+        assert_eq!(fence.unmapped_towards_m(core::f32::consts::PI), 0.2);
+        assert_eq!(fence.unmapped_towards_m(-core::f32::consts::FRAC_PI_4), f32::INFINITY);
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod planning;
 
 use crate::atlas::Atlas;
 use crate::place::Place;
+use crate::setbacks::Setbacks;
 use crate::track::{MAX_CORNERS, SHORTEST_M, Track};
 use core::fmt::{self, Write};
 use ipc_types::{MAX_WAYPOINTS, RoomProgress, Text};
@@ -24,6 +25,8 @@ pub(crate) const MAX_GIVEN_UP: usize = 64;
 const AMNESTIES: u32 = 6;
 /// Share of the building behind doors that are taken for shut beyond which they are tried again and again.
 const MUCH: f32 = 0.25;
+/// A door that was found shut so often is shut: somebody in it turns round sooner.
+const TRIED_ENOUGH: u32 = 3;
 /// Work slices between two looks whether the next stops are still worth the way: once a second.
 pub(crate) const TRIM_EVERY: u32 = 20;
 
@@ -101,6 +104,7 @@ pub struct Journey {
     doors_again: bool,
     /// How often each door was found shut in this round.
     pub(crate) found_shut: Vec<u32>,
+    pub(crate) setbacks: Setbacks,
     pub(crate) since_trim: u32,
     pub(crate) round: bool,
     trouble: Text<64>,
@@ -136,6 +140,7 @@ impl Journey {
             amnesties: 0,
             doors_again: false,
             found_shut: vec![0; map.doors().len()],
+            setbacks: Setbacks::new(),
             since_trim: 0,
             round: false,
             trouble: Text::default(),
@@ -152,6 +157,7 @@ impl Journey {
         self.rooms.fill(RoomPlan::default());
         self.reasons.fill(Text::default());
         self.given_up.clear();
+        self.setbacks.clear();
         self.tries = 0;
         self.amnesties = 0;
         self.doors_again = false;
@@ -240,23 +246,24 @@ impl Journey {
     }
 
     /// What stood in the way may have moved on, and who stood in a door made it look shut: forgets them when rooms were left
-    /// out for that. Things a few times; doors once, and as often as things while much of the building lies behind them:
-    /// then those first that were found shut least often.
+    /// out for that. Things a few times; doors until each was found shut thrice, and as often as things while much of the
+    /// building lies behind them: those first that were found shut least often.
     pub(crate) fn forgive(&mut self) -> bool {
         let patient = self.amnesties < AMNESTIES;
         let things = patient && self.rooms.iter().any(|room| room.skipped == Some(Obstacle::Unmapped));
         let doors = self.behind_doors();
-        let doors = if self.doors_again { patient && doors > MUCH } else { doors > 0.0 };
+        let doors = if self.doors_again { patient && doors > MUCH } else { doors > 0.0 }
+            || (patient && doors > 0.0 && self.least_found_shut() < TRIED_ENOUGH);
         if !(doors || things) {
             return false;
         }
         self.amnesties += 1;
         self.map.set_unmapped(&Bits::default());
+        self.setbacks.forgive(|x, y| self.map.mark_unmapped(x, y));
         self.given_up.clear();
         if doors {
-            let shut = |door: &usize| self.map.door_closed(*door);
             let times = |door: usize| self.found_shut.get(door).copied().unwrap_or_default();
-            let least = (0..self.map.doors().len()).filter(shut).map(times).min().unwrap_or_default();
+            let least = self.least_found_shut();
             for door in 0..self.map.doors().len() {
                 if !self.doors_again || times(door) <= least {
                     self.map.set_door(door, false);
@@ -265,6 +272,13 @@ impl Journey {
             self.doors_again = true;
         }
         true
+    }
+
+    /// How often that door was found shut which was found so least often, of those that count as shut.
+    fn least_found_shut(&self) -> u32 {
+        let times = |door: usize| self.found_shut.get(door).copied().unwrap_or_default();
+        let shut = |door: &usize| self.map.door_closed(*door);
+        (0..self.map.doors().len()).filter(shut).map(times).min().unwrap_or_default()
     }
 
     /// Share of the building's floor in rooms that are left out because of a shut door. While the drone is shut in itself,

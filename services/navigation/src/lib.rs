@@ -10,6 +10,7 @@
 //! - [`blockage`]: when a way counts as blocked
 //! - [`mission`]: commands, phases of the pilot, the pad
 //! - [`journey`]: planning in slices, what was seen, what is left out and why; survives a restart
+//! - `setbacks`: where the way was blocked before
 //! - [`atlas`]: what is known of the building
 //! - [`core`]: all of it together, without ports
 //!
@@ -28,6 +29,7 @@ pub mod place;
 mod report;
 pub mod senses;
 mod service;
+mod setbacks;
 pub mod steer;
 pub mod track;
 mod trim;

@@ -12,8 +12,8 @@ const STILL_S: f32 = 1.0;
 const PATIENCE_S: f32 = 15.0;
 /// A round that was ordered and is still on the ground after this is given up, seconds: arming takes 5 to 10.
 const TAKE_OFF_S: f32 = 45.0;
-/// That little: times the usual distance.
-const PATIENCE_SHARE: f32 = 2.5;
+/// That little: times the usual distance. The estimate is off by as much again, and the pad is 0.35 m to its rim.
+const PATIENCE_SHARE: f32 = 1.8;
 
 /// Where the mission is heading.
 #[derive(Clone, Copy, Debug, PartialEq)]

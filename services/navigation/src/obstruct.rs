@@ -2,6 +2,7 @@
 
 use crate::journey::{Journey, MAX_GIVEN_UP, SAME_STOP_M};
 use crate::place::Place;
+use crate::setbacks::across;
 use avoid::Window;
 use avoid::swath::for_each_certain;
 
@@ -43,9 +44,11 @@ impl Journey {
         });
         if nearest.is_finite() {
             // A cone enters some of what it hears of a leaf before or behind it.
-            let (x, y) =
-                if 2 * in_door >= heard { there } else { (place.x + nearest * cos, place.y + nearest * sin) };
-            self.shut_door(place, x, y);
+            let ahead = (place.x + nearest * cos, place.y + nearest * sin);
+            let (x, y) = if 2 * in_door >= heard { there } else { ahead };
+            if !self.shut_door(place, x, y) && self.setbacks.note(ahead.0, ahead.1, towards) {
+                across(ahead.0, ahead.1, towards, |x, y| self.map.mark_unmapped(x, y));
+            }
         } else {
             nearest = self.map.limits().radius_m + UNSEEN_HALF_M;
             for aside in [-UNSEEN_HALF_M, 0.0, UNSEEN_HALF_M] {
@@ -58,11 +61,11 @@ impl Journey {
         self.count_try();
     }
 
-    /// What was seen in a door is the door, unless the drone itself stands in it.
-    fn shut_door(&mut self, place: &Place, x: f32, y: f32) {
-        let Some(door) = self.map.door_near(x, y, DOOR_M) else { return };
+    /// What was seen in a door is the door, unless the drone itself stands in it. Whether it is.
+    fn shut_door(&mut self, place: &Place, x: f32, y: f32) -> bool {
+        let Some(door) = self.map.door_near(x, y, DOOR_M) else { return false };
         if self.map.doors().get(door).is_some_and(|door| door.distance(place.x, place.y) < IN_DOOR_M) {
-            return;
+            return false;
         }
         self.map.set_door(door, true);
         if let Some(times) = self.found_shut.get_mut(door) {
@@ -76,6 +79,7 @@ impl Journey {
                 self.map.mark_unmapped(a.0 + t * (b.0 - a.0), a.1 + t * (b.1 - a.1));
             }
         }
+        true
     }
 
     fn count_try(&mut self) {

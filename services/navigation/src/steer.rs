@@ -298,7 +298,8 @@ impl Steering {
         let swaying = ((place.velocity_sigma - KNOWN_M_S) / UNKNOWN_OVER_M_S).clamp(0.0, 1.0 - LEAST_SHARE);
         speed *= 1.0 - swaying;
         let fence = Fence::around(scene, self.craft.radius_m);
-        speed = speed.min(BESIDE_M_S + BESIDE_PER_S * (fence.unmapped_m() - fence::KEEP_M).max(0.0));
+        speed = speed
+            .min(BESIDE_M_S + BESIDE_PER_S * (fence.unmapped_towards_m(direction) - fence::KEEP_M).max(0.0));
         let off = wrap(direction - place.heading).abs();
         speed *= 1.0 - ((off - TURN_FREE_RAD) / (TURN_FIRST_RAD - TURN_FREE_RAD)).clamp(0.0, 1.0);
         speed = speed.min(self.speed + SPEED_UP_M_S2 * scene.dt_s.clamp(0.0, 0.2));

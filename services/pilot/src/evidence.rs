@@ -17,8 +17,9 @@ const HOME_PACE: f32 = 0.6;
 const HOVER_HOURS: f32 = 1.0 / 6.0;
 /// Time of a landing, seconds.
 const LANDING_S: f32 = 15.0;
-/// Time for what happens on the way home, seconds: somebody in a door is waited for, or it is shut and there is another.
-const MEETING_S: f32 = 40.0;
+/// Time for what happens on the way home, seconds: somebody in a door is waited for, it is shut and there is another, and
+/// somebody stands on the pad.
+const MEETING_S: f32 = 75.0;
 
 impl PilotCore {
     /// Gathers the evidence and judges it.

@@ -57,7 +57,7 @@ pub(crate) fn craft() -> Craft {
         beam_rest_m: BEAM_REST,
         hover_us: 1480.0,
         cells: 4,
-        capacity_mah: 3300.0,
+        capacity_mah: 3700.0,
         cruise_m_s: 0.5,
         max_tilt_rad: 10f32.to_radians(),
     }

@@ -1,0 +1,72 @@
+//! A flight of real processes on shared memory in real time, beside the same services in lockstep.
+//!
+//! Scheduling, pseudo-terminals and wake-ups differ, so the two are not the same flight bit for bit: gusts and people meet the
+//! drone elsewhere. What must agree is how it ended and how well it knew its place.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use serde_json::Value;
+use sereno_tests::{deploy_with, programs};
+use std::path::Path;
+use std::process::Command;
+
+/// The small test building: a round of about two minutes.
+const BUILDING: &str = "two-rooms";
+const SEED: &str = "1";
+/// How far apart the two may be: the median and the 95th percentile of the position error (metres), what was seen of what
+/// can be seen. Twelve flights of this building in lockstep with other seeds scatter by about as much.
+const MEDIAN_M: f64 = 0.02;
+const P95_M: f64 = 0.06;
+const SEEN: f64 = 0.03;
+
+fn sereno(deploy: &Path, run_dir: &Path, arguments: &[&str]) -> String {
+    let program = programs().join("sereno");
+    let output = Command::new(&program)
+        .arg("--deploy")
+        .arg(deploy)
+        .arg("--run-dir")
+        .arg(run_dir)
+        .args(arguments)
+        .output()
+        .unwrap_or_else(|error| panic!("{}: {error}; `cargo xtask test` builds it", program.display()));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        output.status.success(),
+        "sereno {}: {}\n{}\n{}",
+        arguments.join(" "),
+        output.status,
+        String::from_utf8_lossy(&output.stderr),
+        text.lines().rev().take(12).collect::<Vec<_>>().join("\n")
+    );
+    text
+}
+
+fn number(report: &Value, path: &str) -> f64 {
+    report.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("no {path} in {report}"))
+}
+
+#[test]
+fn processes_in_real_time_end_as_lockstep_does_and_know_their_place_as_well() {
+    let directory = tempfile::tempdir().unwrap();
+    let deploy = deploy_with(directory.path(), BUILDING).unwrap();
+    let run_dir = directory.path().join("run");
+    let picture = directory.path().join("flight.svg");
+    let picture = picture.to_str().unwrap();
+
+    // Exits zero only on the pad and without a contact.
+    let lines =
+        sereno(&deploy, &run_dir, &["demo", "--once", "--json", "--seed", SEED, "--picture", picture]);
+    let real: Value = serde_json::from_str(lines.lines().last().unwrap()).unwrap();
+    let text = sereno(&deploy, &run_dir, &["rehearse", "--seed", SEED, "--json", "--out", "-"]);
+    let lockstep: Value = serde_json::from_str(&text).unwrap();
+    let lockstep = &lockstep["flights"][0];
+
+    let said = format!("real time {real}\nlockstep {lockstep}");
+    assert_eq!(real["outcome"], lockstep["outcome"], "{said}");
+    assert_eq!((number(&real, "/contacts"), number(lockstep, "/contacts")), (0.0, 0.0), "{said}");
+    assert!((number(&real, "/coverage") - number(lockstep, "/coverage")).abs() < SEEN, "{said}");
+    for (path, bound) in [("/loc_error_m/median", MEDIAN_M), ("/loc_error_m/p95", P95_M)] {
+        assert!((number(&real, path) - number(lockstep, path)).abs() < bound, "{path}: {said}");
+    }
+    assert!(std::fs::metadata(picture).unwrap().len() > 1000);
+    println!("{said}");
+}
