@@ -9,14 +9,16 @@ use sereno_tests::{deploy_with, programs};
 use std::path::Path;
 use std::process::Command;
 
-/// The small test building: a round of about two minutes.
+/// The small test building: a round of about a minute with light clutter.
 const BUILDING: &str = "two-rooms";
 const SEED: &str = "1";
 /// How far apart the two may be: the median and the 95th percentile of the position error (metres), what was seen of what
-/// can be seen. Twelve flights of this building in lockstep with other seeds scatter by about as much.
+/// can be seen, the ratio of the times. Twelve flights in lockstep, seeds 1 to 12, had medians of 0.025 to 0.038 m, 95th
+/// percentiles of 0.065 to 0.135 m and times of 43 to 76 s.
 const MEDIAN_M: f64 = 0.02;
-const P95_M: f64 = 0.06;
-const SEEN: f64 = 0.03;
+const P95_M: f64 = 0.08;
+const SEEN: f64 = 0.04;
+const TIMES: f64 = 1.6;
 
 fn sereno(deploy: &Path, run_dir: &Path, arguments: &[&str]) -> String {
     let program = programs().join("sereno");
@@ -48,6 +50,10 @@ fn number(report: &Value, path: &str) -> f64 {
 fn processes_in_real_time_end_as_lockstep_does_and_know_their_place_as_well() {
     let directory = tempfile::tempdir().unwrap();
     let deploy = deploy_with(directory.path(), BUILDING).unwrap();
+    let simulator = deploy.join("config/simulator.toml");
+    let text = std::fs::read_to_string(&simulator).unwrap();
+    assert!(text.contains("clutter = \"full\""));
+    std::fs::write(&simulator, text.replace("clutter = \"full\"", "clutter = \"light\"")).unwrap();
     let run_dir = directory.path().join("run");
     let picture = directory.path().join("flight.svg");
     let picture = picture.to_str().unwrap();
@@ -56,7 +62,11 @@ fn processes_in_real_time_end_as_lockstep_does_and_know_their_place_as_well() {
     let lines =
         sereno(&deploy, &run_dir, &["demo", "--once", "--json", "--seed", SEED, "--picture", picture]);
     let real: Value = serde_json::from_str(lines.lines().last().unwrap()).unwrap();
-    let text = sereno(&deploy, &run_dir, &["rehearse", "--seed", SEED, "--json", "--out", "-"]);
+    let text = sereno(
+        &deploy,
+        &run_dir,
+        &["rehearse", "--clutter", "light", "--seed", SEED, "--json", "--out", "-"],
+    );
     let lockstep: Value = serde_json::from_str(&text).unwrap();
     let lockstep = &lockstep["flights"][0];
 
@@ -67,6 +77,7 @@ fn processes_in_real_time_end_as_lockstep_does_and_know_their_place_as_well() {
     for (path, bound) in [("/loc_error_m/median", MEDIAN_M), ("/loc_error_m/p95", P95_M)] {
         assert!((number(&real, path) - number(lockstep, path)).abs() < bound, "{path}: {said}");
     }
+    let ratio = number(&real, "/time_s") / number(lockstep, "/time_s");
+    assert!((1.0 / TIMES..TIMES).contains(&ratio), "{ratio}: {said}");
     assert!(std::fs::metadata(picture).unwrap().len() > 1000);
-    println!("{said}");
 }
