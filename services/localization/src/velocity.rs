@@ -30,6 +30,9 @@ const SILENT_S: f64 = 0.3;
 /// Standard deviation of one place of the particles, metres: they err by 3 cm, but for seconds, 16 times a second, and by
 /// much more before they know that they are lost. What is felt carries the velocity that long.
 const PLACE_M: f32 = 0.3;
+/// Particles that spread by more than this along an axis are held by no wall there, metres: they go where this filter goes, and
+/// to hear that back says nothing.
+const HELD_M: f32 = 0.1;
 /// Standard deviation of the velocity that it begins with, and of one that stands on the ground, m/s.
 const BEGIN_M_S: f32 = 0.2;
 const STANDING_M_S: f32 = 0.02;
@@ -262,7 +265,7 @@ impl Velocity {
             }
             let mut along = [0.0; STATES];
             along[PLACE + Y * axis] = 1.0;
-            self.take(&along, off[axis], PLACE_M.hypot(spread[axis]));
+            self.take(&along, off[axis], PLACE_M * (1.0 + (spread[axis] / HELD_M).powi(2)));
         }
     }
 

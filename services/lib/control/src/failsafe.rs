@@ -162,7 +162,7 @@ impl Default for Policy {
             pose_hover_s: 1.0,
             pose_land_s: 20.0,
             walls_land_s: 5.0,
-            drift_land_s: 3.0,
+            drift_land_s: 1.5,
             sonars_hover_s: 0.5,
             sonars_land_s: 5.0,
             return_volts: 3.5,

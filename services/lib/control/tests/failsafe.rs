@@ -26,8 +26,8 @@ fn the_numbers_of_the_design() {
     assert_eq!(at(pose, 0.99), (Cause::None, Action::None));
     assert_eq!(at(pose, 1.01), (Cause::PoseUncertain, Action::Hover));
     assert_eq!(at(pose, 20.1), (Cause::Lost, Action::Descend));
-    assert_eq!(at(|e, s| e.adrift_s = s, 2.9), (Cause::None, Action::None));
-    assert_eq!(at(|e, s| e.adrift_s = s, 3.1), (Cause::Lost, Action::Descend));
+    assert_eq!(at(|e, s| e.adrift_s = s, 1.4), (Cause::None, Action::None));
+    assert_eq!(at(|e, s| e.adrift_s = s, 1.6), (Cause::Lost, Action::Descend));
     let sonars = |e: &mut Evidence, s| e.all_sonars_silent_s = s;
     assert_eq!(at(sonars, 0.51), (Cause::AllSonarsSilent, Action::Hover));
     assert_eq!(at(sonars, 5.1), (Cause::AllSonarsSilent, Action::Land));

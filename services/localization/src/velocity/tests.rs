@@ -172,3 +172,21 @@ fn it_is_silent_when_nothing_is_measured() {
     assert!((v[0] - 0.4).abs() < 0.02, "{v:?}");
     assert!(velocity.at(500 * MS, &attitudes, &frames).is_none());
 }
+
+#[test]
+fn a_set_that_no_wall_holds_says_nothing_of_the_velocity() {
+    // Along a corridor the particles go where this filter goes: their place agrees with it whatever is true.
+    let (attitudes, frames) = (told([0.0; 2], 1.9, |_| [0.0; 2], |_| 0.0), Frames::default());
+    let after = |spread: [f32; 2]| {
+        let mut velocity = Velocity::default();
+        velocity.begin(1000 * MS, [0.0; 2], [0.0; 2], [0.0; 2]);
+        for i in 1..=30u64 {
+            let place = velocity.place_now();
+            velocity.place((1000 + 60 * i) * MS, place, spread, [0.0; 2], &attitudes, &frames);
+        }
+        velocity.velocity_variance().map(f32::sqrt)
+    };
+    let ([along, across], [blind, _]) = (after([0.3, 0.03]), after([50.0; 2]));
+    assert!(along > 0.9 * blind, "{along} of {blind}: what it hears back is its own");
+    assert!(across < 0.8 * along, "{across} of {along}: a wall holds it across");
+}

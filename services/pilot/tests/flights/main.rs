@@ -219,8 +219,8 @@ fn a_hover_that_flow_holds_needs_no_walls_and_one_adrift_comes_down() {
         rig.phase()
     };
     assert_eq!(lost(false, 10.0), Phase::Hover);
-    assert_eq!(lost(true, 2.5), Phase::Hover, "`failsafe.drift_land_s` is 3 s");
-    assert_eq!(lost(true, 4.5), Phase::EmergencyLanding);
+    assert_eq!(lost(true, 1.0), Phase::Hover, "`failsafe.drift_land_s` is 1.5 s");
+    assert_eq!(lost(true, 3.0), Phase::EmergencyLanding);
 }
 
 #[test]
