@@ -1,14 +1,16 @@
 //! The route: planned in slices, followed, planned again when something stands in the way.
 
+mod amnesty;
 mod planning;
 
 use crate::atlas::Atlas;
 use crate::place::Place;
 use crate::setbacks::Setbacks;
 use crate::track::{MAX_CORNERS, SHORTEST_M, Track};
+use amnesty::Amnesties;
 use core::fmt::{self, Write};
 use ipc_types::{MAX_WAYPOINTS, RoomProgress, Text};
-use patrol::{Bits, Costmap, Obstacle, RoomPlan, Round, RoutePlanner, Seen, Stop, Tally};
+use patrol::{Bits, Costmap, RoomPlan, Round, RoutePlanner, Seen, Stop, Tally};
 use std::sync::Arc;
 
 /// One slice of a route, in cells of 0.1 us.
@@ -21,12 +23,6 @@ const LOOK_EVERY_M: f32 = 0.15;
 const MAX_LOOKS: usize = 8192;
 /// Places that are given up for one round at most.
 pub(crate) const MAX_GIVEN_UP: usize = 64;
-/// So often in a round what stood in the way is believed to have moved on, when nothing is left to see but behind it.
-const AMNESTIES: u32 = 6;
-/// Share of the building behind doors that are taken for shut beyond which they are tried again and again.
-const MUCH: f32 = 0.25;
-/// A door that was found shut so often is shut: somebody in it turns round sooner.
-const TRIED_ENOUGH: u32 = 3;
 /// Work slices between two looks whether the next stops are still worth the way: once a second.
 pub(crate) const TRIM_EVERY: u32 = 20;
 
@@ -99,7 +95,7 @@ pub struct Journey {
     pub(crate) tries: u32,
     pub(crate) given_up: Vec<(f32, f32)>,
     fresh_starts: u32,
-    amnesties: u32,
+    amnesties: Amnesties,
     /// The doors that were found shut have been looked at again.
     doors_again: bool,
     /// How often each door was found shut in this round.
@@ -137,7 +133,7 @@ impl Journey {
             tries: 0,
             given_up: Vec::with_capacity(MAX_GIVEN_UP),
             fresh_starts: 0,
-            amnesties: 0,
+            amnesties: Amnesties::default(),
             doors_again: false,
             found_shut: vec![0; map.doors().len()],
             setbacks: Setbacks::new(),
@@ -159,7 +155,7 @@ impl Journey {
         self.given_up.clear();
         self.setbacks.clear();
         self.tries = 0;
-        self.amnesties = 0;
+        self.amnesties = Amnesties::default();
         self.doors_again = false;
         self.found_shut.fill(0);
         self.looks.clear();
@@ -243,55 +239,6 @@ impl Journey {
             self.plan();
         }
         again
-    }
-
-    /// What stood in the way may have moved on, and who stood in a door made it look shut: forgets them when rooms were left
-    /// out for that. Things a few times; doors until each was found shut thrice, and as often as things while much of the
-    /// building lies behind them: those first that were found shut least often.
-    pub(crate) fn forgive(&mut self) -> bool {
-        let patient = self.amnesties < AMNESTIES;
-        let things = patient && self.rooms.iter().any(|room| room.skipped == Some(Obstacle::Unmapped));
-        let doors = self.behind_doors();
-        let doors = if self.doors_again { patient && doors > MUCH } else { doors > 0.0 }
-            || (patient && doors > 0.0 && self.least_found_shut() < TRIED_ENOUGH);
-        if !(doors || things) {
-            return false;
-        }
-        self.amnesties += 1;
-        self.map.set_unmapped(&Bits::default());
-        self.setbacks.forgive(|x, y| self.map.mark_unmapped(x, y));
-        self.given_up.clear();
-        if doors {
-            let times = |door: usize| self.found_shut.get(door).copied().unwrap_or_default();
-            let least = self.least_found_shut();
-            for door in 0..self.map.doors().len() {
-                if !self.doors_again || times(door) <= least {
-                    self.map.set_door(door, false);
-                }
-            }
-            self.doors_again = true;
-        }
-        true
-    }
-
-    /// How often that door was found shut which was found so least often, of those that count as shut.
-    fn least_found_shut(&self) -> u32 {
-        let times = |door: usize| self.found_shut.get(door).copied().unwrap_or_default();
-        let shut = |door: &usize| self.map.door_closed(*door);
-        (0..self.map.doors().len()).filter(shut).map(times).min().unwrap_or_default()
-    }
-
-    /// Share of the building's floor in rooms that are left out because of a shut door. While the drone is shut in itself,
-    /// away from the pad, all.
-    fn behind_doors(&self) -> f32 {
-        let behind = |room: &&RoomPlan| matches!(room.skipped, Some(Obstacle::DoorClosed(_)));
-        let home = self.stops.last().and_then(|pad| pad.room).and_then(|room| self.rooms.get(room));
-        if home.as_ref().is_some_and(behind) {
-            return 1.0;
-        }
-        let floor: usize = self.rooms.iter().map(|room| room.floor).sum();
-        let shut: usize = self.rooms.iter().filter(behind).map(|room| room.floor).sum();
-        shut as f32 / floor.max(1) as f32
     }
 
     /// What the present leg is for.
