@@ -2,7 +2,7 @@
 //!
 //! Scheduling, pseudo-terminals and wake-ups differ, so the two are not the same flight bit for bit: gusts and people meet the
 //! drone elsewhere. What must agree is how it ended and how well it knew its place.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use serde_json::Value;
 use sereno_tests::{deploy_with, programs};
