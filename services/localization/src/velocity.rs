@@ -17,8 +17,9 @@
 //! velocity towards what was heard. The particles' place, which the walls hold fast, keeps the sum right. A controller
 //! that tells no forces leaves the gust (first order, the Dryden shape) to be learned from the motion.
 
+mod optical;
+
 use crate::attitude::{Attitudes, Tilt, seconds};
-use crate::flow::Frame;
 use crate::kalman::Kalman;
 use crate::rate::{LONGEST_S, Ping};
 use ipc_types::MAX_SONARS;
@@ -61,8 +62,6 @@ const LEVEL_WALK: f64 = 0.002;
 const FELT_WALK: f64 = 0.025;
 /// Random walk of the velocity beside the gust, m/s per √s: tilt is read to a tenth of a degree, 30 times a second.
 const WALK: f64 = 0.1;
-/// How fast the weight of a surprising measurement falls, like Student's t: flow errs when the body turns fast.
-const FLOW_TAIL: f32 = 0.1;
 /// m/s².
 const GRAVITY: f32 = 9.806_65;
 
@@ -196,43 +195,6 @@ impl Velocity {
 
     pub(crate) fn is_known(&self, time_ns: u64) -> bool {
         self.time_ns > 0 && seconds(self.time_ns, time_ns) <= SILENT_S
-    }
-
-    /// Takes a flow frame.
-    pub(crate) fn flow(&mut self, frame: &Frame, attitudes: &Attitudes, frames: &Frames) {
-        if !self.is_known(frame.time_ns) {
-            return;
-        }
-        self.advance(frame.time_ns, attitudes, frames);
-        self.flows = true;
-        let [x, y] = in_plan(frame, attitudes, frames);
-        // A frame from before the state's time is a little old; the gust since then is not worth a replay.
-        let [vx, vy] = self.velocity_now();
-        let miss = [x - vx, y - vy];
-        let [of_x, of_y] = self.velocity_variance();
-        let spread = frame.sigma * frame.sigma + of_x.max(of_y);
-        let sigma = frame.sigma * (1.0 + FLOW_TAIL * (miss[0] * miss[0] + miss[1] * miss[1]) / spread).sqrt();
-        self.forget_share();
-        self.measure([1.0, 0.0], miss[0], sigma);
-        self.measure([0.0, 1.0], miss[1], sigma);
-    }
-
-    /// Takes a flow frame from over a poor floor: it shows an unknown share of the velocity. While the velocity
-    /// is well known the share is learned from it, afterwards the velocity is from the share.
-    pub(crate) fn dim(&mut self, frame: &Frame, attitudes: &Attitudes, frames: &Frames) {
-        if !self.is_known(frame.time_ns) {
-            return;
-        }
-        self.advance(frame.time_ns, attitudes, frames);
-        self.flows = true;
-        for (axis, shown) in in_plan(frame, attitudes, frames).into_iter().enumerate() {
-            let (velocity, share) = (self.filter.state[SPEED + Y * axis], self.filter.state[SHARE_AT]);
-            let mut along = [0.0; STATES];
-            (along[SPEED + Y * axis], along[SHARE_AT]) = (share, velocity);
-            self.take(&along, shown - (share * velocity) as f32, frame.sigma);
-            let share = &mut self.filter.state[SHARE_AT];
-            *share = share.clamp(f64::from(SHARE_LEAST), 1.0);
-        }
     }
 
     /// Takes the particles' place at a time, and their spread along both axes: along a corridor they know it no
@@ -399,14 +361,6 @@ impl Velocity {
 fn tilted(tilt: &Tilt, level: [f32; 2]) -> [f32; 2] {
     let of = |angle: f32| GRAVITY * angle.clamp(-0.6, 0.6).tan();
     [of(tilt.pitch - level[1]), -of(tilt.roll - level[0])]
-}
-
-/// The velocity of a frame, which is in the body's, in the plan's.
-fn in_plan(frame: &Frame, attitudes: &Attitudes, frames: &Frames) -> [f32; 2] {
-    let yaw = attitudes.at(frame.time_ns).unwrap_or_default().yaw + frames.heading_offset;
-    let (sin, cos) = yaw.sin_cos();
-    let [x, y] = frame.velocity;
-    [cos * x - sin * y, sin * x + cos * y]
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
 use super::*;
+use crate::flow::Frame;
 
 pub(crate) const MS: u64 = 1_000_000;
 
