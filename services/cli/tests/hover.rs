@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use cli::flight::{Flight, Setup};
-use ipc_types::Verb;
+use ipc_types::{Grid, Polar, Verb};
 use std::path::Path;
 
 fn setup(clutter: &str) -> Setup {
@@ -44,14 +44,17 @@ fn it_takes_off_stands_and_lands() {
     }
 }
 
-/// Half a minute of a round in a cluttered building, twice, and with another seed.
+/// Half a minute of a round in a cluttered building, twice, while somebody else watches, and with another seed.
 #[test]
 fn the_same_seed_is_the_same_flight_byte_for_byte() {
-    let fly = |seed: u64| {
+    let fly = |seed: u64, watched: bool| {
         // Nothing is shared between the two flights: a cache filled by the first must not matter.
         let setup = setup("full");
         let mut flight = Flight::start(&setup, seed).unwrap();
         let mut bytes = Vec::new();
+        let mut tool = flight.bus.tool("cli");
+        let _grids = watched.then(|| tool.input::<Grid>(2).unwrap());
+        let _polars = watched.then(|| tool.input::<Polar>(2).unwrap());
         flight.run_for(6.0);
         flight.order(Verb::PatrolStart, f32::NAN, f32::NAN);
         for _ in 0..60 {
@@ -61,7 +64,8 @@ fn the_same_seed_is_the_same_flight_byte_for_byte() {
         }
         (bytes, flight.bus.steps())
     };
-    let first = fly(5);
-    assert!(first == fly(5), "the second flight differs from the first");
-    assert!(first != fly(6));
+    let first = fly(5, false);
+    assert!(first == fly(5, false), "the second flight differs from the first");
+    assert!(first == fly(5, true), "watching changes the flight");
+    assert!(first != fly(6, false));
 }

@@ -1,8 +1,8 @@
 //! The lockstep bus: queues in one process, on a simulated clock.
 
 use crate::device::{ByteDevice, MemoryDevice};
-use crate::mix_seed;
 use crate::port::Limits;
+use crate::{Start, mix_seed};
 use ipc_types::Message;
 use std::any::Any;
 use std::cell::{Cell, RefCell};
@@ -23,9 +23,27 @@ struct Waiting<T> {
     slot: Rc<T>,
 }
 
+/// Seeded delays of one input: most messages are quick, a few are late. Each input draws its own, so that who else listens
+/// changes nothing.
+struct Delays {
+    seed: u64,
+    drawn: Cell<u64>,
+}
+
+impl Delays {
+    fn draw_ns(&self) -> u64 {
+        let count = self.drawn.get();
+        self.drawn.set(count + 1);
+        let draw = mix_seed(self.seed, count);
+        let late = if draw.is_multiple_of(LATE_ONE_IN) { ((draw >> 40) * DELAY_LATE_NS) >> 24 } else { 0 };
+        DELAY_LEAST_NS + (((draw >> 32) * DELAY_SPREAD_NS) >> 32) + late
+    }
+}
+
 struct Queue<T> {
     waiting: RefCell<VecDeque<Waiting<T>>>,
     depth: usize,
+    delays: Delays,
     /// The service that reads, and whether it is to be woken.
     wakes: Option<String>,
     closed: Cell<bool>,
@@ -99,7 +117,6 @@ pub(crate) struct Bus {
     topics: RefCell<Vec<(String, Rc<dyn AnyTopic>)>>,
     wires: Wires,
     seed: u64,
-    drawn: Cell<u64>,
     now: Cell<u64>,
 }
 
@@ -109,22 +126,12 @@ impl Bus {
             topics: RefCell::default(),
             wires: RefCell::default(),
             seed,
-            drawn: Cell::new(0),
             now: Cell::new(0),
         })
     }
 
     pub(crate) fn set_now(&self, now: u64) {
         self.now.set(now);
-    }
-
-    /// A seeded delay: most messages are quick, a few are late.
-    pub(crate) fn delay_ns(&self) -> u64 {
-        let count = self.drawn.get();
-        self.drawn.set(count + 1);
-        let draw = mix_seed(self.seed, count);
-        let late = if draw.is_multiple_of(LATE_ONE_IN) { ((draw >> 40) * DELAY_LATE_NS) >> 24 } else { 0 };
-        DELAY_LEAST_NS + (((draw >> 32) * DELAY_SPREAD_NS) >> 32) + late
     }
 
     fn topic<T: Message>(&self, name: &str) -> Rc<Topic<T>> {
@@ -155,14 +162,16 @@ impl Bus {
         wake: bool,
     ) -> LockstepInput<T> {
         let topic = self.topic::<T>(name);
+        let topic_seed = Start::service_seed(Start::service_seed(self.seed, service), name);
         let queue = Rc::new(Queue {
             waiting: RefCell::new(VecDeque::with_capacity(depth + 1)),
             depth,
+            delays: Delays { seed: mix_seed(topic_seed, self.now.get()), drawn: Cell::new(0) },
             wakes: wake.then(|| service.to_owned()),
             closed: Cell::new(false),
         });
         if let Some(newest) = topic.newest.borrow().as_ref() {
-            let visible_ns = self.now.get() + self.delay_ns();
+            let visible_ns = self.now.get() + queue.delays.draw_ns();
             queue.waiting.borrow_mut().push_back(Waiting { visible_ns, slot: Rc::clone(newest) });
         }
         topic.readers.borrow_mut().push(Rc::clone(&queue));
@@ -170,10 +179,10 @@ impl Bus {
         LockstepInput { queue, bus: Rc::clone(self) }
     }
 
-    pub(crate) fn output<T: Message>(self: &Rc<Self>, name: &str) -> LockstepOutput<T> {
+    pub(crate) fn output<T: Message>(&self, name: &str) -> LockstepOutput<T> {
         let topic = self.topic::<T>(name);
         topic.fill_pool();
-        LockstepOutput { topic, bus: Rc::clone(self) }
+        LockstepOutput { topic }
     }
 
     /// The two services that ask for the same device are wired to each other.
@@ -235,12 +244,11 @@ impl<T: Message> Drop for LockstepInput<T> {
 
 pub(crate) struct LockstepOutput<T: Message> {
     topic: Rc<Topic<T>>,
-    bus: Rc<Bus>,
 }
 
 impl<T: Message> Clone for LockstepOutput<T> {
     fn clone(&self) -> Self {
-        Self { topic: Rc::clone(&self.topic), bus: Rc::clone(&self.bus) }
+        Self { topic: Rc::clone(&self.topic) }
     }
 }
 
@@ -261,7 +269,7 @@ impl<T: Message> LockstepOutput<T> {
             let mut waiting = queue.waiting.borrow_mut();
             // A later message is never visible before an earlier one.
             let earliest = waiting.back().map_or(0, |last| last.visible_ns);
-            let visible_ns = (now + self.bus.delay_ns()).max(earliest);
+            let visible_ns = (now + queue.delays.draw_ns()).max(earliest);
             if waiting.len() == queue.depth {
                 waiting.pop_front();
             }
