@@ -103,7 +103,7 @@ pub const UNITS_PER_READING: u8 = 8;
 
 impl Default for GridRules {
     /// The `flight` configuration: six readings saturate, so that what moved on is cleared by sixteen
-    /// pings (3 s at 5.6 Hz a sensor); a full cell is forgotten in 32 s, because who stands between two cones
+    /// pings (3 s at 5.6 Hz a sensor); a full cell is forgotten in 19 s, because who stands between two cones
     /// is heard by neither; an echo from behind takes three eighths of a reading away, for a coat swallows every fifth ping.
     fn default() -> Self {
         Self {
@@ -111,7 +111,7 @@ impl Default for GridRules {
             most: 6 * UNITS_PER_READING,
             clear_echo: 3,
             clear_silence: 1,
-            decay_per_s: 1.5,
+            decay_per_s: 2.5,
             clear_margin_m: 0.15,
             clear_near: 2,
             near_m: 0.5,
@@ -355,7 +355,7 @@ mod tests {
             .map(|i| u32::from(rules.faded(start + i * 5_000_000, start + (i + 1) * 5_000_000)))
             .sum();
         assert_eq!(fine, u32::from(rules.faded(start, start + 3_000_000_000)));
-        assert_eq!(fine, 5, "1.5 a second, rounded on the absolute scale");
+        assert_eq!(fine, 7, "2.5 a second, rounded on the absolute scale");
     }
 
     #[test]

@@ -122,12 +122,7 @@ pub(crate) struct Bus {
 
 impl Bus {
     pub(crate) fn new(seed: u64) -> Rc<Self> {
-        Rc::new(Self {
-            topics: RefCell::default(),
-            wires: RefCell::default(),
-            seed,
-            now: Cell::new(0),
-        })
+        Rc::new(Self { topics: RefCell::default(), wires: RefCell::default(), seed, now: Cell::new(0) })
     }
 
     pub(crate) fn set_now(&self, now: u64) {
