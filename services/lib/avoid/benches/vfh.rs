@@ -1,7 +1,7 @@
 //! One avoidance step: scroll, eight beams, walls, histogram, decision (target: 20 us).
 #![allow(clippy::unwrap_used, missing_docs, reason = "bench")]
 
-use avoid::grid::{insert, scroll};
+use avoid::grid::{Faded, insert, scroll};
 use avoid::{
     Avoider, Beam, CELLS, Echo, GridRules, Histogram, SECTORS, Situation, Vfh, VfhConfig, WallLayer, Window,
 };
@@ -27,7 +27,7 @@ fn step(c: &mut Criterion) {
             // 0.5 m/s at 20 Hz.
             x = (x + 0.025) % 100.0;
             let to = Window::around(x, 0.0).unwrap();
-            scroll(&cells, &window, &mut next, &to, 1);
+            scroll(&cells, &window, &mut next, &to, Faded { far: 1, near: 1, cells: 14 });
             std::mem::swap(&mut cells, &mut next);
             window = to;
             walls.follow(&window, solid);

@@ -86,6 +86,10 @@ pub struct GridRules {
     pub clear_silence: u8,
     /// Taken from every cell each second.
     pub decay_per_s: f32,
+    /// And from those no farther than this from the drone's middle, metres:
+    pub lingers_m: f32,
+    /// less, each second. What is so near stands between two cones for long, and soft things answer none of them.
+    pub lingering_decay_per_s: f32,
     /// Clearing ends this far before the echo, metres: range noise and half a cell diagonal.
     pub clear_margin_m: f32,
     /// Nearer to the sensor than [`Self::near_m`] a beam takes no more than this: what is a little lower or higher than the
@@ -103,7 +107,7 @@ pub const UNITS_PER_READING: u8 = 8;
 
 impl Default for GridRules {
     /// The `flight` configuration: six readings saturate, so that what moved on is cleared by sixteen
-    /// pings (3 s at 5.6 Hz a sensor); a full cell is forgotten in 19 s, because who stands between two cones
+    /// pings (3 s at 5.6 Hz a sensor); a full cell is forgotten in 19 s, near the drone in 32 s, because who stands between two cones
     /// is heard by neither; an echo from behind takes three eighths of a reading away, for a coat swallows every fifth ping.
     fn default() -> Self {
         Self {
@@ -112,6 +116,8 @@ impl Default for GridRules {
             clear_echo: 3,
             clear_silence: 1,
             decay_per_s: 2.5,
+            lingers_m: 0.7,
+            lingering_decay_per_s: 1.5,
             clear_margin_m: 0.15,
             clear_near: 2,
             near_m: 0.5,
@@ -124,20 +130,41 @@ impl GridRules {
     /// Only increments, as in the thesis.
     #[must_use]
     pub fn thesis() -> Self {
-        Self { clear_echo: 0, clear_silence: 0, decay_per_s: 0.0, ..Self::default() }
+        Self {
+            clear_echo: 0,
+            clear_silence: 0,
+            decay_per_s: 0.0,
+            lingering_decay_per_s: 0.0,
+            ..Self::default()
+        }
     }
 
     /// Units that fade between two instants. Counted on an absolute time scale, so that nothing is lost to
     /// rounding however short the steps are and no remainder has to survive a restart.
     #[must_use]
-    pub fn faded(&self, earlier_ns: u64, later_ns: u64) -> u8 {
-        let rate = f64::from(self.decay_per_s);
-        if !(rate.is_finite() && rate > 0.0) || later_ns <= earlier_ns {
-            return 0;
-        }
-        let units = |ns: u64| (ns as f64 * 1e-9 * rate).floor();
-        (units(later_ns) - units(earlier_ns)).clamp(0.0, 255.0) as u8
+    pub fn faded(&self, earlier_ns: u64, later_ns: u64) -> Faded {
+        let units = |rate: f32| {
+            let rate = f64::from(rate);
+            if !(rate.is_finite() && rate > 0.0) || later_ns <= earlier_ns {
+                return 0;
+            }
+            let until = |ns: u64| (ns as f64 * 1e-9 * rate).floor();
+            (until(later_ns) - until(earlier_ns)).clamp(0.0, 255.0) as u8
+        };
+        let cells = (self.lingers_m / CELL_M).clamp(0.0, SIDE as f32) as i32;
+        Faded { far: units(self.decay_per_s), near: units(self.lingering_decay_per_s), cells }
     }
+}
+
+/// What every cell loses when the window moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Faded {
+    /// Units that a cell loses.
+    pub far: u8,
+    /// Units that one near the middle loses.
+    pub near: u8,
+    /// How far from the middle that is, cells.
+    pub cells: i32,
 }
 
 /// What one ping brought back.
@@ -165,9 +192,9 @@ pub struct Beam {
     pub echo: Echo,
 }
 
-/// Moves the window: copies what `last` and `next` share, less `faded` units a cell; what enters is zero.
+/// Moves the window: copies what `last` and `next` share, less what has `faded`; what enters is zero.
 /// Columns shorter than [`CELLS`] are left alone.
-pub fn scroll(last: &[u8], from: &Window, next: &mut [u8], to: &Window, faded: u8) {
+pub fn scroll(last: &[u8], from: &Window, next: &mut [u8], to: &Window, faded: Faded) {
     if next.len() < CELLS {
         return;
     }
@@ -182,8 +209,13 @@ pub fn scroll(last: &[u8], from: &Window, next: &mut [u8], to: &Window, faded: u
     for row in (-up).max(0)..(side - up).min(side) {
         let read = (row + up) as usize * SIDE + read_x;
         let write = row as usize * SIDE + write_x;
-        for (w, r) in next[write..write + width].iter_mut().zip(&last[read..read + width]) {
-            *w = r.saturating_sub(faded);
+        let aside = row - side / 2;
+        let near = faded.cells * faded.cells - aside * aside;
+        let first = write_x as i32 - side / 2;
+        for ((w, r), ahead) in
+            next[write..write + width].iter_mut().zip(&last[read..read + width]).zip(first..)
+        {
+            *w = r.saturating_sub(if ahead * ahead <= near { faded.near } else { faded.far });
         }
     }
 }
@@ -337,13 +369,13 @@ mod tests {
         for (x, y) in [(0.34, 0.02), (-0.4, 0.3), (0.02, -0.9), (1.9, -1.9)] {
             let to = Window::around(x, y).unwrap();
             let mut next = vec![7u8; CELLS];
-            scroll(&last, &from, &mut next, &to, 3);
+            scroll(&last, &from, &mut next, &to, Faded { far: 3, ..Faded::default() });
             assert_eq!(next[to.index(place.0, place.1).unwrap()], 97);
             assert_eq!(next.iter().filter(|c| **c > 0).count(), 1);
         }
         let far = Window::around(40.0, 0.0).unwrap();
         let mut next = vec![7u8; CELLS];
-        scroll(&last, &from, &mut next, &far, 0);
+        scroll(&last, &from, &mut next, &far, Faded::default());
         assert!(next.iter().all(|c| *c == 0));
     }
 
@@ -351,11 +383,31 @@ mod tests {
     fn decay_does_not_depend_on_the_length_of_the_steps() {
         let rules = GridRules::default();
         let start = 1_234_567_890u64;
-        let fine: u32 = (0..600u64)
-            .map(|i| u32::from(rules.faded(start + i * 5_000_000, start + (i + 1) * 5_000_000)))
-            .sum();
-        assert_eq!(fine, u32::from(rules.faded(start, start + 3_000_000_000)));
-        assert_eq!(fine, 7, "2.5 a second, rounded on the absolute scale");
+        let fine = (0..600u64)
+            .map(|i| rules.faded(start + i * 5_000_000, start + (i + 1) * 5_000_000))
+            .fold((0, 0), |sum, faded| (sum.0 + u32::from(faded.far), sum.1 + u32::from(faded.near)));
+        let coarse = rules.faded(start, start + 3_000_000_000);
+        assert_eq!(fine, (u32::from(coarse.far), u32::from(coarse.near)));
+        assert_eq!(fine, (7, 5), "2.5 and 1.5 a second, rounded on the absolute scale");
+        assert_eq!(rules.faded(start, start), rules.faded(start, 0), "the clock went back");
+        let thesis = GridRules::thesis().faded(start, start + 3_000_000_000);
+        assert_eq!((thesis.far, thesis.near), (0, 0), "only increments");
+    }
+
+    /// Seeds 1762 and 1801: a plant and a person were forgotten at 0.2 and 0.4 m, because no beam hears a soft thing there.
+    #[test]
+    fn what_is_near_lingers() {
+        let window = Window::around(3.02, 4.02).unwrap();
+        let (near, far) = (window.index(3.6, 4.0).unwrap(), window.index(3.9, 4.0).unwrap());
+        let mut last = vec![0u8; CELLS];
+        (last[near], last[far]) = (8, 8);
+        let mut next = vec![0u8; CELLS];
+        let faded = GridRules::default().faded(1, 4_000_000_000);
+        scroll(&last, &window, &mut next, &window, faded);
+        assert_eq!((next[near], next[far]), (2, 0));
+        let beyond = Window::around(2.52, 4.02).unwrap();
+        scroll(&last, &window, &mut next, &beyond, faded);
+        assert_eq!(next[beyond.index(3.6, 4.0).unwrap()], 0, "it is by where the drone is now");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What the floor plan knows, on the raster of the certainty grid.
 
-use crate::grid::{CELLS, SIDE, Window, scroll};
+use crate::grid::{CELLS, Faded, SIDE, Window, scroll};
 
 /// Certainty of a mapped wall, in the units of the grid: four readings. A plan is believed more than a single
 /// ping and no more than a few, because it is up to 3 cm off.
@@ -34,7 +34,7 @@ impl WallLayer {
         let (right, up) = match self.window {
             Some(last) if last == *window => return,
             Some(last) => {
-                scroll(&self.cells, &last, &mut self.spare, window, 0);
+                scroll(&self.cells, &last, &mut self.spare, window, Faded::default());
                 core::mem::swap(&mut self.cells, &mut self.spare);
                 last.shift_to(window)
             }

@@ -2,7 +2,7 @@
 //! exactly as told. Up on the page is +y; angles are counter-clockwise (the thesis counts clockwise).
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use avoid::grid::{insert, scroll};
+use avoid::grid::{Faded, insert, scroll};
 use avoid::{
     Avoider, Beam, CELLS, Decision, Echo, GridRules, Histogram, Reason, SECTORS, Situation, Vfh, VfhConfig,
 };
@@ -72,7 +72,7 @@ fn fly(world: &World, config: VfhConfig, seconds: f32) -> Flight {
     let mut flight = Flight { path: vec![(x, y)], reasons: Vec::new(), nearest: f32::MAX, arrived: false };
     for _ in 0..(seconds / 0.05) as usize {
         let to = Window::around(x, y).unwrap();
-        scroll(&cells, &window, &mut next, &to, 0);
+        scroll(&cells, &window, &mut next, &to, Faded::default());
         std::mem::swap(&mut cells, &mut next);
         window = to;
         for ray in 0..16 {

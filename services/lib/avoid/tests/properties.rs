@@ -1,7 +1,7 @@
 //! Whatever bytes stand in the grids: no panic, no NaN, and never a blocked sector chosen.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use avoid::grid::{insert, scroll};
+use avoid::grid::{Faded, insert, scroll};
 use avoid::swath::free_length;
 use avoid::{Avoider, Beam, CELLS, Echo, GridRules, Histogram, Reason, SECTORS, Situation, Smoothing, Vfh};
 use avoid::{VfhConfig, Window, sector_of};
@@ -83,7 +83,7 @@ proptest! {
         prop_assert!((0.0..=1.5).contains(&free));
         if let (Some(to), true) = (Window::around(x, y), cells.len() >= CELLS) {
             let mut next = vec![0; CELLS];
-            scroll(&cells, &window, &mut next, &to, 1);
+            scroll(&cells, &window, &mut next, &to, Faded { far: 1, ..Faded::default() });
         }
     }
 }
