@@ -88,10 +88,7 @@ impl Service for Localization {
         let hash = fold(plan.hash());
         let model = ConeModel { max_range_m: config.sonar.max_range, ..ConeModel::default() };
         let table = start.shared(&format!("cone table {model:?}"), || {
-            let table = ConeTable::new(plan, model);
-            // No look-up in flight is to allocate.
-            table.allocate();
-            Ok(table)
+            ConeTable::new(plan, model).map_err(StartError::invalid)
         })?;
         let filter =
             Filter::new(config.filter(), Arc::clone(&table), MAX_PARTICLES).map_err(StartError::invalid)?;

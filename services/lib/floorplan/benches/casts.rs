@@ -157,7 +157,7 @@ fn casts(c: &mut Criterion) {
     let (name, plan) = named_plan().unwrap_or_else(drawn_hall);
     let plan = Arc::new(plan);
     let model = ConeModel::default();
-    let table = ConeTable::new(Arc::clone(&plan), model);
+    let Ok(table) = ConeTable::new(Arc::clone(&plan), model) else { return };
     let mut lot = Lot(0x5eed_0001);
     let sets =
         [("uniform", Poses::uniform(&plan, &mut lot)), ("clustered", Poses::clustered(&plan, &mut lot))];

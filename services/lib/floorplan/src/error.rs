@@ -76,6 +76,12 @@ pub enum PlanError {
         /// The plan.
         file: String,
     },
+    /// The table of what the sonars hear everywhere does not fit into this machine's addresses.
+    #[error("the plan is too large for this machine: its sonar table takes {megabytes} MB")]
+    Memory {
+        /// Room for all of its free space.
+        megabytes: usize,
+    },
     /// The pad is not in free space.
     #[error("the pad at ({x_m:.2}, {y_m:.2}) is {place}: it must stand in free space")]
     PadPlace {

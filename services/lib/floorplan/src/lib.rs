@@ -20,7 +20,7 @@ mod sidecar;
 mod surface;
 
 pub use cast::{ConeModel, Hit, cast_cone};
-pub use cone_table::{ConeCell, ConeTable};
+pub use cone_table::ConeTable;
 pub use distance::DistanceField;
 pub use error::PlanError;
 pub use header::{PictureMode, PlanHeader};

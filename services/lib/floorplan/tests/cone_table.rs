@@ -33,15 +33,15 @@ fn building() -> Plan {
     Plan::from_ascii(&rows, 0.05)
 }
 
-/// Among `COUNT` questions from random free places: the share of ranges off by more than two cells, and of
-/// echoes that only one of table and exact casting has.
+/// Of `COUNT` questions from random free places: the share of the ranges that table and exact casting both have and
+/// that are off by more than two cells, and the share of the questions where only one of the two has an echo.
 fn shares_off(plan: &Arc<Plan>) -> (f64, f64) {
-    const COUNT: usize = 10_000;
+    const COUNT: usize = 40_000;
     let model = ConeModel::default();
-    let table = ConeTable::new(Arc::clone(plan), model);
+    let table = ConeTable::new(Arc::clone(plan), model).unwrap();
     let mut random = Questions(0x5eed_0001);
     let (width, height) = (plan.width() as f32 * plan.resolution(), plan.height() as f32 * plan.resolution());
-    let (mut asked, mut off, mut one_sided) = (0, 0, 0);
+    let (mut asked, mut both, mut off, mut one_sided) = (0, 0, 0, 0);
     while asked < COUNT {
         let (x, y) = (plan.origin().0 + random.next() * width, plan.origin().1 + random.next() * height);
         if plan.cell_at(x, y) != Cell::Free {
@@ -52,17 +52,21 @@ fn shares_off(plan: &Arc<Plan>) -> (f64, f64) {
         let exact = cast_cone(plan, &model, x, y, angle).unwrap_or(f32::INFINITY);
         let fast = table.range(x, y, angle);
         match (exact.is_finite(), fast.is_finite()) {
-            (true, true) => off += usize::from((fast - exact).abs() > 2.0 * plan.resolution()),
+            (true, true) => {
+                both += 1;
+                off += usize::from((fast - exact).abs() > 2.0 * plan.resolution());
+            }
             (false, false) => {}
             _ => one_sided += 1,
         }
     }
-    (off as f64 / COUNT as f64, one_sided as f64 / COUNT as f64)
+    assert!(both > COUNT / 5, "{both}");
+    (off as f64 / both as f64, one_sided as f64 / COUNT as f64)
 }
 
-/// 10 000 fixed questions: at a true share of 0.01 the standard deviation is 0.001. A range jumps where a
-/// thing enters the cone, and an echo comes and goes where a wall turns away: half a degree or 2 cm of
-/// rounding moves those borders, which is what both shares count.
+/// 40 000 fixed questions, of which more than 8 000 have an echo: at a true share of 0.008 the standard deviation of
+/// the first share is 0.001. A range jumps where a thing enters the cone, and an echo comes and goes where a wall turns
+/// away: half a degree or 2 cm of rounding moves those borders, which is what both shares count.
 #[test]
 fn less_than_one_in_a_hundred_ranges_is_off_by_two_cells() {
     let (off, one_sided) = shares_off(&Arc::new(building()));
@@ -98,8 +102,8 @@ fn equal_questions_have_equal_answers_on_any_number_of_threads() {
             })
             .collect()
     };
-    let alone = ask(&ConeTable::new(Arc::clone(&plan), ConeModel::default()), 7);
-    let shared = ConeTable::new(Arc::clone(&plan), ConeModel::default());
+    let alone = ask(&ConeTable::new(Arc::clone(&plan), ConeModel::default()).unwrap(), 7);
+    let shared = ConeTable::new(Arc::clone(&plan), ConeModel::default()).unwrap();
     std::thread::scope(|scope| {
         let threads: Vec<_> = (0..4).map(|_| scope.spawn(|| ask(&shared, 7))).collect();
         for thread in threads {
@@ -111,19 +115,17 @@ fn equal_questions_have_equal_answers_on_any_number_of_threads() {
 #[test]
 fn memory_follows_the_places_that_were_asked_about() {
     let plan = Arc::new(building());
-    let table = ConeTable::new(Arc::clone(&plan), ConeModel::default());
+    let table = ConeTable::new(Arc::clone(&plan), ConeModel::default()).unwrap();
     let before = table.memory_bytes();
     table.range(1.0, 1.0, 0.0);
     let one = table.memory_bytes();
-    assert!(one > before && one < before + 500_000);
+    assert!(one > before && one < before + 1_000, "{before} {one}");
     table.range(1.01, 1.01, 2.0);
     assert_eq!(table.memory_bytes(), one);
-    table.allocate();
-    let all = table.memory_bytes();
     for (x, y) in [(3.0, 3.0), (9.0, 5.0), (11.0, 7.0)] {
         table.range(x, y, 0.0);
     }
-    assert_eq!(table.memory_bytes(), all, "no look-up from free space allocates any more");
+    assert_eq!(table.memory_bytes(), one + 3 * (one - before));
     assert_eq!(table.range(-1.0, 1.0, 0.0), f32::INFINITY);
     assert_eq!(table.range(f32::NAN, 1.0, f32::NAN), f32::INFINITY);
     assert!(table.range(1.0, 1.0, f32::NAN) >= 0.0);
@@ -133,7 +135,7 @@ fn memory_follows_the_places_that_were_asked_about() {
 #[test]
 fn the_answer_changes_smoothly_inside_a_cell() {
     let plan = Arc::new(building());
-    let table = ConeTable::new(Arc::clone(&plan), ConeModel::default());
+    let table = ConeTable::new(Arc::clone(&plan), ConeModel::default()).unwrap();
     for k in 0..200 {
         let x = 1.0 + 0.005 * k as f32;
         let range = table.range(x, 1.0, std::f32::consts::PI);

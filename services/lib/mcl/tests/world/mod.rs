@@ -90,7 +90,7 @@ impl World {
             .collect();
         let rows: Vec<&str> = fine.iter().map(String::as_str).collect();
         let plan = Arc::new(Plan::from_ascii(&rows, f64::from(SIDE) / FINER as f64));
-        Self { solid, table: Arc::new(ConeTable::new(plan, ConeModel::default())) }
+        Self { solid, table: Arc::new(ConeTable::new(plan, ConeModel::default()).unwrap()) }
     }
 
     fn is_solid(&self, ix: i32, iy: i32) -> bool {
