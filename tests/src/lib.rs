@@ -3,6 +3,7 @@
 pub mod counting;
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// The root of the checkout that these tests belong to.
 #[must_use]
@@ -40,4 +41,48 @@ pub fn deploy_with(directory: &Path, building: &str) -> std::io::Result<PathBuf>
         )?;
     }
     Ok(copy)
+}
+
+/// As [`deploy_with`], with light clutter in the simulator's configuration.
+///
+/// # Errors
+/// What reading and writing files reports; also when the configuration says nothing of full clutter.
+pub fn lightly_cluttered(directory: &Path, building: &str) -> std::io::Result<PathBuf> {
+    let deploy = deploy_with(directory, building)?;
+    let simulator = deploy.join("config/simulator.toml");
+    let text = std::fs::read_to_string(&simulator)?;
+    let lighter = text.replace("clutter = \"full\"", "clutter = \"light\"");
+    if lighter == text {
+        return Err(std::io::Error::other("no full clutter in simulator.toml"));
+    }
+    std::fs::write(&simulator, lighter)?;
+    Ok(deploy)
+}
+
+/// Runs `sereno` over a deploy directory and returns what it printed.
+///
+/// # Panics
+/// When it does not exit with zero: with what it said and its last lines.
+#[must_use]
+#[allow(clippy::panic, reason = "for tests")]
+pub fn sereno(deploy: &Path, run_dir: &Path, arguments: &[&str]) -> String {
+    let program = programs().join("sereno");
+    let output = Command::new(&program)
+        .arg("--deploy")
+        .arg(deploy)
+        .arg("--run-dir")
+        .arg(run_dir)
+        .args(arguments)
+        .output()
+        .unwrap_or_else(|error| panic!("{}: {error}; `cargo xtask test` builds it", program.display()));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        output.status.success(),
+        "sereno {}: {}\n{}\n{}",
+        arguments.join(" "),
+        output.status,
+        String::from_utf8_lossy(&output.stderr),
+        text.lines().rev().take(12).collect::<Vec<_>>().join("\n")
+    );
+    text
 }

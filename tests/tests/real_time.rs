@@ -5,9 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use serde_json::Value;
-use sereno_tests::{deploy_with, programs};
-use std::path::Path;
-use std::process::Command;
+use sereno_tests::{lightly_cluttered, sereno};
 
 /// The small test building: a round of about a minute with light clutter.
 const BUILDING: &str = "two-rooms";
@@ -20,28 +18,6 @@ const P95_M: f64 = 0.08;
 const SEEN: f64 = 0.04;
 const TIMES: f64 = 1.6;
 
-fn sereno(deploy: &Path, run_dir: &Path, arguments: &[&str]) -> String {
-    let program = programs().join("sereno");
-    let output = Command::new(&program)
-        .arg("--deploy")
-        .arg(deploy)
-        .arg("--run-dir")
-        .arg(run_dir)
-        .args(arguments)
-        .output()
-        .unwrap_or_else(|error| panic!("{}: {error}; `cargo xtask test` builds it", program.display()));
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(
-        output.status.success(),
-        "sereno {}: {}\n{}\n{}",
-        arguments.join(" "),
-        output.status,
-        String::from_utf8_lossy(&output.stderr),
-        text.lines().rev().take(12).collect::<Vec<_>>().join("\n")
-    );
-    text
-}
-
 fn number(report: &Value, path: &str) -> f64 {
     report.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("no {path} in {report}"))
 }
@@ -49,11 +25,7 @@ fn number(report: &Value, path: &str) -> f64 {
 #[test]
 fn processes_in_real_time_end_as_lockstep_does_and_know_their_place_as_well() {
     let directory = tempfile::tempdir().unwrap();
-    let deploy = deploy_with(directory.path(), BUILDING).unwrap();
-    let simulator = deploy.join("config/simulator.toml");
-    let text = std::fs::read_to_string(&simulator).unwrap();
-    assert!(text.contains("clutter = \"full\""));
-    std::fs::write(&simulator, text.replace("clutter = \"full\"", "clutter = \"light\"")).unwrap();
+    let deploy = lightly_cluttered(directory.path(), BUILDING).unwrap();
     let run_dir = directory.path().join("run");
     let picture = directory.path().join("flight.svg");
     let picture = picture.to_str().unwrap();

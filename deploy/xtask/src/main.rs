@@ -27,6 +27,9 @@ enum Task {
         /// Where to draw the flight.
         #[arg(long, default_value = "flight.svg")]
         picture: PathBuf,
+        /// Kill each flight-critical service so often (SIGKILL) at random moments.
+        #[arg(long, default_value_t = 0)]
+        kills: u32,
     },
     /// Run every test.
     Test,
@@ -35,7 +38,7 @@ enum Task {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let done = match arguments.task {
-        Task::Demo { once, seed, picture } => demo(once, seed, &picture),
+        Task::Demo { once, seed, picture, kills } => demo(once, seed, &picture, kills),
         Task::Test => test(),
     };
     match done {
@@ -82,13 +85,13 @@ fn build_programs(root: &Path) -> Result<PathBuf> {
     Ok(root.join(target).join("release"))
 }
 
-fn demo(once: bool, seed: u64, picture: &Path) -> Result<ExitCode> {
+fn demo(once: bool, seed: u64, picture: &Path, kills: u32) -> Result<ExitCode> {
     let root = checkout()?;
     let programs = build_programs(&root)?;
     println!("Flying the demo building, seed {seed}:");
     let mut command = Command::new(programs.join("sereno"));
     command.arg("--deploy").arg(root.join("deploy")).args(["demo", "--seed", &seed.to_string()]);
-    command.arg("--picture").arg(picture);
+    command.arg("--picture").arg(picture).args(["--kills", &kills.to_string()]);
     if once {
         command.arg("--once");
     }

@@ -187,4 +187,8 @@ pub(crate) struct Demo {
     /// Give up after this many seconds.
     #[arg(long, default_value_t = 1500)]
     pub patience: u64,
+    /// Kill each of localization, navigation, sonar, pilot and flight so often (SIGKILL) at moments drawn from the seed;
+    /// with --once this must lead to no more than a hover.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100))]
+    pub kills: u32,
 }

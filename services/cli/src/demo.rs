@@ -1,6 +1,7 @@
 //! `sereno demo`: the system as processes, one round, a line a second, a picture and a report.
 
 use crate::arguments::Demo;
+use crate::kills::Kills;
 use airframe::picture::Picture;
 use airframe::score::{FlightReport, Outcome};
 use anyhow::{Context, Result, bail};
@@ -91,16 +92,31 @@ pub(crate) fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
     }
     let mut system = System::start(place, demo.seed)?;
     wait_until_ready(place, &mut system)?;
-    let flown = fly(place, demo, &stop, json);
+    let mut kills = (demo.kills > 0)
+        .then(|| Ok::<_, anyhow::Error>(Kills::new(place.run_dir()?, demo.kills, demo.seed)))
+        .transpose()?;
+    let flown = fly(place, demo, kills.as_mut(), &stop, json);
     system.stop(place)?;
     let (report, picture) = flown?;
     std::fs::write(&demo.picture, picture).with_context(|| demo.picture.display().to_string())?;
-    show(&report, demo, json)?;
-    let good = report.outcome == Outcome::LandedOnPad && report.contacts == 0;
+    show(&report, demo, kills.as_ref(), json)?;
+    let good = report.outcome == Outcome::LandedOnPad
+        && report.contacts == 0
+        && kills.as_ref().is_none_or(Kills::shrugged_off);
     Ok(if good || !demo.once { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn fly(place: &Place, demo: &Demo, stop: &AtomicBool, json: bool) -> Result<(FlightReport, String)> {
+/// Flies one round among processes that run already.
+///
+/// # Errors
+/// Also when the simulator was started again on the way: the drone then stands on the pad of a new world.
+fn fly(
+    place: &Place,
+    demo: &Demo,
+    mut kills: Option<&mut Kills>,
+    stop: &AtomicBool,
+    json: bool,
+) -> Result<(FlightReport, String)> {
     let (manifest, root, run_dir) = place.running()?;
     let entry = manifest.services.get("simulator").context("the manifest has no simulator")?;
     let text = std::fs::read_to_string(root.join(&entry.config)).with_context(|| entry.config.clone())?;
@@ -121,6 +137,12 @@ fn fly(place: &Place, demo: &Demo, stop: &AtomicBool, json: bool) -> Result<(Fli
     while began.elapsed() < Duration::from_secs(demo.patience) && !stop.load(Ordering::Relaxed) {
         tool.tick();
         witness.look(&world);
+        if witness.last_truth.is_some_and(|truth| truth.header.incarnation > 0) {
+            bail!("the simulator was started again in flight, and its world with it: what was flown proves nothing");
+        }
+        if let Some(kills) = kills.as_deref_mut() {
+            kills.look(began.elapsed(), &witness)?;
+        }
         if !witness.flown() && last_order.is_none_or(|at| at.elapsed() > ORDER_AGAIN) {
             last_order = Some(Instant::now());
             orders.give(
@@ -182,9 +204,13 @@ fn line(witness: &Witness, elapsed: Duration, json: bool) {
     }
 }
 
-fn show(report: &FlightReport, demo: &Demo, json: bool) -> Result<()> {
+fn show(report: &FlightReport, demo: &Demo, kills: Option<&Kills>, json: bool) -> Result<()> {
     if json {
-        println!("{}", serde_json::to_string(report)?);
+        let mut report = serde_json::to_value(report)?;
+        if let Some(kills) = kills {
+            report["kills"] = kills.report();
+        }
+        println!("{report}");
         return Ok(());
     }
     println!();
@@ -207,6 +233,9 @@ fn show(report: &FlightReport, demo: &Demo, json: bool) -> Result<()> {
     }
     for skipped in &report.skipped {
         println!("skipped: {skipped}");
+    }
+    if let Some(kills) = kills {
+        println!("{}", kills.sentence());
     }
     println!("picture: {}", demo.picture.display());
     Ok(())

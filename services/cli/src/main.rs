@@ -4,6 +4,7 @@
 mod arguments;
 mod check;
 mod demo;
+mod kills;
 mod operate;
 mod rehearse;
 mod system;
