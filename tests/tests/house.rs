@@ -31,8 +31,18 @@ const SERVICES: [&str; 7] = ["sonar", "flow", "flight", "localization", "navigat
 
 #[test]
 fn libraries_see_each_other_and_pure_crates_only() {
-    let pure: BTreeSet<&str> =
-        ["bytemuck", "nalgebra", "rand", "image", "serde", "serde-saphyr", "toml", "pathfinding", "thiserror"].into();
+    let pure: BTreeSet<&str> = [
+        "bytemuck",
+        "nalgebra",
+        "rand",
+        "image",
+        "serde",
+        "serde-saphyr",
+        "toml",
+        "pathfinding",
+        "thiserror",
+    ]
+    .into();
     let house = house();
     for library in LIBRARIES {
         let (place, needs) = &house[library];

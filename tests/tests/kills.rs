@@ -3,8 +3,8 @@
 //! The full campaign, ten kills each over the demo building, is `cargo xtask demo --once --kills 10`.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
-use sereno_tests::{lightly_cluttered, sereno};
 use serde_json::Value;
+use sereno_tests::{lightly_cluttered, sereno};
 
 /// Real processes in real time: which flight it becomes differs from run to run, what must hold does not. With `--once` the
 /// command fails unless the drone lands on the pad untouched, every kill was done, the place is known to 0.3 m two seconds

@@ -138,7 +138,9 @@ fn fly(
         tool.tick();
         witness.look(&world);
         if witness.last_truth.is_some_and(|truth| truth.header.incarnation > 0) {
-            bail!("the simulator was started again in flight, and its world with it: what was flown proves nothing");
+            bail!(
+                "the simulator was started again in flight, and its world with it: what was flown proves nothing"
+            );
         }
         if let Some(kills) = kills.as_deref_mut() {
             kills.look(began.elapsed(), &witness)?;

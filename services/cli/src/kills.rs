@@ -3,8 +3,8 @@
 use anyhow::{Context, Result};
 use cli::witness::Witness;
 use ipc_types::{FailsafeAction, FailsafeCause, Phase};
-use rustix::process::{Pid, Signal, kill_process};
 use runtime::mix_seed;
+use rustix::process::{Pid, Signal, kill_process};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -114,7 +114,8 @@ impl Kills {
 
     /// For people.
     pub(crate) fn sentence(&self) -> String {
-        let worst = self.worst.map_or_else(|| "nothing".to_owned(), |(action, cause)| format!("{cause}: {action}"));
+        let worst =
+            self.worst.map_or_else(|| "nothing".to_owned(), |(action, cause)| format!("{cause}: {action}"));
         format!(
             "{} kills, {} to come; later than {} s after one the place was off by {:.1} cm at most; the worst that they led to: {worst}",
             self.done.len(),

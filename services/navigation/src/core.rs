@@ -160,8 +160,7 @@ impl Core {
         match event {
             Ok(None) => return,
             Ok(Some(Event::NewRound)) => {
-                self.journey.new_round();
-                self.journey.plan();
+                self.journey.plan_new_round();
                 self.started_ns = self.last_ns.unwrap_or(0);
             }
             Ok(Some(Event::Plan)) => self.journey.plan(),

@@ -7,7 +7,7 @@ use crate::atlas::Atlas;
 use crate::place::Place;
 use crate::setbacks::Setbacks;
 use crate::track::{MAX_CORNERS, SHORTEST_M, Track};
-use amnesty::Amnesties;
+use amnesty::{Amnesties, Pardon};
 use core::fmt::{self, Write};
 use ipc_types::{MAX_WAYPOINTS, RoomProgress, Text};
 use patrol::{Bits, Costmap, RoomPlan, Round, RoutePlanner, Seen, Stop, Tally};
@@ -104,6 +104,10 @@ pub struct Journey {
     pub(crate) since_trim: u32,
     pub(crate) round: bool,
     trouble: Text<64>,
+    /// The planning that was asked for begins with a clean slate.
+    afresh: bool,
+    /// It begins with an amnesty, for the doors too if so.
+    pardon: Option<Pardon>,
 }
 
 impl Journey {
@@ -140,13 +144,22 @@ impl Journey {
             since_trim: 0,
             round: false,
             trouble: Text::default(),
+            afresh: false,
+            pardon: None,
             map,
             atlas,
         }
     }
 
-    /// Forgets everything that an earlier round has seen.
-    pub fn new_round(&mut self) {
+    /// Asks for a round that knows nothing of earlier ones.
+    pub fn plan_new_round(&mut self) {
+        self.plan();
+        self.afresh = true;
+    }
+
+    /// Forgets everything that an earlier round has seen. Allocates: for the start and for planning.
+    pub(crate) fn new_round(&mut self) {
+        self.pardon = None;
         self.map = self.atlas.map().clone();
         self.seen = Seen::new(&self.map);
         self.to_see = Bits::default();

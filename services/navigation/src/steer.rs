@@ -24,12 +24,8 @@ const BESIDE_PER_S: f32 = 0.7;
 /// Uncertainty of the velocity that costs no speed, metres a second, and over how much more it falls to the least share.
 const KNOWN_M_S: f32 = 0.08;
 const UNKNOWN_OVER_M_S: f32 = 0.25;
-/// Cells are widened by the airframe and this, metres, where there is room: gusts and an error of the velocity carry
-/// the drone 0.1 m off its way before it is flown back, and the raster eats five centimetres. Where that leaves no way,
-/// by the second: a passage of the disc + 0.30 m is still flown. What is narrower on the plan (doors) is flown along
-/// the planned line.
-const ROOMY_M: f32 = 0.18;
-const TIGHT_M: f32 = 0.10;
+/// What is narrower on the plan than both of the histogram's configurations allow (doors) is flown along the planned line.
+///
 /// The strip looked at ahead is wider than the airframe by this on each side, metres; where there is room, and where
 /// there is little.
 const ROOMY_SWATH_M: f32 = 0.12;
@@ -149,14 +145,9 @@ impl Steering {
     /// # Errors
     /// A vehicle that the histogram cannot be made for.
     pub fn new(craft: Craft) -> Result<Self, ConfigError> {
-        let vfh = |margin_m: f32| {
-            let flight = VfhConfig::flight(craft.radius_m);
-            Vfh::new(VfhConfig { clearance_m: craft.radius_m + margin_m, ..flight })
-        };
-        let (roomy, tight) = (vfh(ROOMY_M)?, vfh(TIGHT_M)?);
         Ok(Self {
-            roomy,
-            tight,
+            roomy: Vfh::new(VfhConfig::flight(craft.radius_m))?,
+            tight: Vfh::new(VfhConfig::tight(craft.radius_m))?,
             squeezing: false,
             craft,
             heading: f32::NAN,

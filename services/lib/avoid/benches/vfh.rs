@@ -1,4 +1,5 @@
-//! One avoidance step: scroll, eight beams, walls, histogram, decision (target: 20 us).
+//! One avoidance step: scroll, eight beams, walls, histogram, decision (target: 20 us); and the same where the first
+//! decision finds no way and a second one is made with less room, as navigation does.
 #![allow(clippy::unwrap_used, missing_docs, reason = "bench")]
 
 use avoid::grid::{Faded, insert, scroll};
@@ -15,14 +16,22 @@ fn solid(x: f32, y: f32) -> bool {
 }
 
 fn step(c: &mut Criterion) {
-    let mut vfh = Vfh::new(VfhConfig::flight(0.225)).unwrap();
+    for squeezing in [false, true] {
+        step_of(c, squeezing);
+    }
+}
+
+fn step_of(c: &mut Criterion, squeezing: bool) {
+    let mut roomy = Vfh::new(VfhConfig::flight(0.225)).unwrap();
+    let mut tight = Vfh::new(VfhConfig::tight(0.225)).unwrap();
     let rules = GridRules::default();
     let mut walls = WallLayer::new();
     let mut window = Window::around(0.0, 0.0).unwrap();
     let (mut cells, mut next) = (vec![0u8; CELLS], vec![0u8; CELLS]);
     let (mut raw, mut smoothed, mut blocked) = ([0.0; SECTORS], [0.0; SECTORS], [0; SECTORS]);
     let mut x = 0.0f32;
-    c.bench_function("vfh_step_81x81_flight", |b| {
+    let name = if squeezing { "vfh_step_81x81_two_decisions" } else { "vfh_step_81x81_flight" };
+    c.bench_function(name, |b| {
         b.iter(|| {
             // 0.5 m/s at 20 Hz.
             x = (x + 0.025) % 100.0;
@@ -44,7 +53,12 @@ fn step(c: &mut Criterion) {
                 max_speed_m_s: 0.5,
             };
             let mut histogram = Histogram { raw: &mut raw, smoothed: &mut smoothed, blocked: &mut blocked };
-            black_box(vfh.decide(&situation, &mut histogram))
+            if squeezing {
+                black_box(roomy.decide(&situation, &mut histogram));
+                tight.decide(&situation, &mut histogram)
+            } else {
+                roomy.decide(&situation, &mut histogram)
+            }
         });
     });
 }

@@ -27,7 +27,7 @@ pub mod walls;
 
 pub use grid::{Beam, CELL_M, CELLS, Echo, GridRules, SIDE, Window};
 pub use histogram::{SECTOR_RAD, SECTORS, Smoothing, sector_of};
-pub use vfh::{ConfigError, Vfh, VfhConfig};
+pub use vfh::{ConfigError, ROOMY_M, TIGHT_M, Vfh, VfhConfig};
 pub use walls::WallLayer;
 
 /// What an avoider is asked.

@@ -18,6 +18,12 @@ pub struct ConfigError {
     pub allowed: &'static str,
 }
 
+/// Cells are widened by the airframe and this, metres, where there is room: gusts and an error of the velocity carry
+/// the drone 0.1 m off its way before it is flown back, and the raster eats five centimetres.
+pub const ROOMY_M: f32 = 0.18;
+/// And by this where that leaves no way: a passage of the disc + 0.30 m stays open.
+pub const TIGHT_M: f32 = 0.10;
+
 /// Parameters of the method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VfhConfig {
@@ -47,19 +53,18 @@ pub struct VfhConfig {
 }
 
 impl VfhConfig {
-    /// The configuration that flies, for a vehicle of this radius.
+    /// The configuration that flies where there is room, for a vehicle of this radius.
     ///
     /// `reach_m` 1.6: at 0.5 m/s the drone stops in 0.36 m (FACTS 2), so what is farther away is the route's
-    /// business. `clearance_m`: 8 cm beside the propeller guards, of which the raster and the plan eat five;
-    /// a passage of disc + 0.30 m stays open. The threshold is passed by two readings of one cell at half a
-    /// metre or three at one metre. `s_max` 8: enlargement keeps the distance, so a wide valley need be
+    /// business. `clearance_m`: [`ROOMY_M`] beside the propeller guards. The threshold is passed by two readings of one
+    /// cell at half a metre or three at one metre. `s_max` 8: enlargement keeps the distance, so a wide valley need be
     /// entered by 20 degrees only.
     #[must_use]
     pub fn flight(radius_m: f32) -> Self {
         Self {
             a: 1.0,
             reach_m: 1.6,
-            clearance_m: radius_m + 0.08,
+            clearance_m: radius_m + ROOMY_M,
             smoothing: Smoothing::Hann,
             threshold_high: 2.5,
             threshold_low: 1.5,
@@ -69,6 +74,12 @@ impl VfhConfig {
             continuity: 4,
             max_detour_rad: 75.0_f32.to_radians(),
         }
+    }
+
+    /// The same with as little room as is allowed, [`TIGHT_M`], for where [`Self::flight`] finds no way on.
+    #[must_use]
+    pub fn tight(radius_m: f32) -> Self {
+        Self { clearance_m: radius_m + TIGHT_M, ..Self::flight(radius_m) }
     }
 
     /// The thesis author's constants (FACTS 7): a point, a = 5, b = a / window, threshold 2, s_max 15, hm 8.

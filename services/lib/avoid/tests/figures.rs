@@ -116,7 +116,7 @@ fn figure_3_8_a_wide_valley_beside_an_obstacle_is_flown_along_its_near_border() 
         "         ##          ",
         "         ##          ",
     ]);
-    let flight = fly(&world, VfhConfig::flight(0.225), 60.0);
+    let flight = fly(&world, VfhConfig::tight(0.225), 60.0);
     assert!(flight.arrived, "{:?}", flight.path.last());
     assert!(flight.reasons.contains(&Reason::WideValley));
     assert!(flight.nearest > 0.225, "{}", flight.nearest);
@@ -172,7 +172,7 @@ fn figure_3_10_a_narrow_valley_is_flown_in_its_middle() {
         "         ##          ",
         "         ##          ",
     ]);
-    let flight = fly(&world, VfhConfig::flight(0.225), 60.0);
+    let flight = fly(&world, VfhConfig::tight(0.225), 60.0);
     assert!(flight.arrived, "{:?}", flight.path.last());
     assert!(flight.nearest > 0.225, "{}", flight.nearest);
     let crossing: Vec<f32> = flight.path.iter().filter(|p| (1.8..2.2).contains(&p.0)).map(|p| p.1).collect();
@@ -198,7 +198,7 @@ fn nearest_with_threshold(threshold: f32) -> f32 {
         threshold_low: threshold,
         // Always at full speed, so that only the threshold decides when it turns away.
         slow_density: 1e6,
-        ..VfhConfig::flight(0.225)
+        ..VfhConfig::tight(0.225)
     };
     fly(&world, config, 12.0).nearest
 }
@@ -227,7 +227,7 @@ fn figure_3_12_a_threshold_far_too_low_closes_a_gap() {
         threshold_high: threshold,
         threshold_low: threshold,
         smoothing: Smoothing13,
-        ..VfhConfig::flight(0.225)
+        ..VfhConfig::tight(0.225)
     };
     #[expect(non_upper_case_globals, reason = "the equation's number reads better")]
     const Smoothing13: avoid::Smoothing = avoid::Smoothing::Triangle;
@@ -241,9 +241,9 @@ fn figure_3_12_a_threshold_far_too_low_closes_a_gap() {
 
 #[test]
 fn the_same_gap_is_open_to_the_flight_configuration_and_shut_to_a_wider_vehicle() {
-    let (decision, _) = decide(&mut Vfh::new(VfhConfig::flight(0.225)).unwrap(), &gap(), 0.0, 1.2);
+    let (decision, _) = decide(&mut Vfh::new(VfhConfig::tight(0.225)).unwrap(), &gap(), 0.0, 1.2);
     assert_eq!(decision.reason, Reason::TargetSafe);
-    let (decision, blocked) = decide(&mut Vfh::new(VfhConfig::flight(0.5)).unwrap(), &gap(), 0.0, 1.2);
+    let (decision, blocked) = decide(&mut Vfh::new(VfhConfig::tight(0.5)).unwrap(), &gap(), 0.0, 1.2);
     assert_eq!(blocked[0], 1);
     assert_ne!(decision.reason, Reason::TargetSafe);
 }
@@ -256,14 +256,14 @@ fn walled_in_all_round_is_blocked() {
         let a = (k as f32).to_radians();
         cells[window.index(0.7 * a.cos(), 0.7 * a.sin()).unwrap()] = 40;
     }
-    let (decision, _) = decide(&mut Vfh::new(VfhConfig::flight(0.225)).unwrap(), &cells, 1.0, 2.0);
+    let (decision, _) = decide(&mut Vfh::new(VfhConfig::tight(0.225)).unwrap(), &cells, 1.0, 2.0);
     assert_eq!((decision.direction_rad, decision.speed_m_s, decision.reason), (None, 0.0, Reason::Blocked));
 }
 
 #[test]
 fn the_threshold_has_hysteresis() {
     let window = Window::around(0.01, 0.01).unwrap();
-    let mut vfh = Vfh::new(VfhConfig::flight(0.225)).unwrap();
+    let mut vfh = Vfh::new(VfhConfig::tight(0.225)).unwrap();
     let mut blocked_with = |certainty: u8| {
         let mut cells = vec![0u8; CELLS];
         cells[window.index(0.51, 0.01).unwrap()] = certainty;
@@ -283,7 +283,7 @@ fn the_valley_flown_last_is_kept_while_two_are_nearly_equal() {
     for i in 0..5 {
         cells[window.index(0.71, -0.09 + 0.05 * i as f32).unwrap()] = 60;
     }
-    let mut vfh = Vfh::new(VfhConfig::flight(0.225)).unwrap();
+    let mut vfh = Vfh::new(VfhConfig::tight(0.225)).unwrap();
     let mut sides = Vec::new();
     for step in 0..20 {
         let target = 0.1 * if step % 2 == 0 { 1.0 } else { -1.0 };
@@ -299,7 +299,7 @@ fn speed_falls_with_the_density_ahead() {
     for certainty in [0u8, 8, 10, 12, 14] {
         let mut cells = vec![0u8; CELLS];
         cells[window.index(0.51, 0.01).unwrap()] = certainty;
-        let (decision, _) = decide(&mut Vfh::new(VfhConfig::flight(0.225)).unwrap(), &cells, 0.0, 2.0);
+        let (decision, _) = decide(&mut Vfh::new(VfhConfig::tight(0.225)).unwrap(), &cells, 0.0, 2.0);
         assert_eq!(decision.reason, Reason::TargetSafe);
         assert!(decision.speed_m_s < last, "{certainty}");
         last = decision.speed_m_s;
@@ -311,6 +311,6 @@ fn speed_falls_with_the_density_ahead() {
 fn a_parameter_out_of_range_is_refused_by_name() {
     let error = Vfh::new(VfhConfig { reach_m: f32::NAN, ..VfhConfig::thesis() }).unwrap_err();
     assert_eq!(error.field, "reach_m");
-    assert!(Vfh::new(VfhConfig { threshold_low: 3.0, ..VfhConfig::flight(0.2) }).is_err());
-    assert!(Vfh::new(VfhConfig { s_max: 0, ..VfhConfig::flight(0.2) }).is_err());
+    assert!(Vfh::new(VfhConfig { threshold_low: 3.0, ..VfhConfig::tight(0.2) }).is_err());
+    assert!(Vfh::new(VfhConfig { s_max: 0, ..VfhConfig::tight(0.2) }).is_err());
 }

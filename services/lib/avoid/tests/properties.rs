@@ -45,7 +45,7 @@ proptest! {
         s_max in 1usize..40,
     ) {
         let smoothing = if triangle { Smoothing::Triangle } else { Smoothing::Hann };
-        let config = VfhConfig { smoothing, straight_at_target: straight, s_max, ..VfhConfig::flight(0.225) };
+        let config = VfhConfig { smoothing, straight_at_target: straight, s_max, ..VfhConfig::tight(0.225) };
         let mut vfh = Vfh::new(config).unwrap();
         for (cells, walls, target_rad, target_m, max_speed_m_s) in &steps {
             let (mut raw, mut smoothed, mut blocked) = ([f32::NAN; SECTORS], [f32::NAN; SECTORS], [9; SECTORS]);

@@ -1,7 +1,8 @@
 //! Casts a second: rays and cones worked out exactly, and the table that flies; and how often the table is off.
 //!
 //! `SERENO_BENCH_PLAN` names a plan (the full path of a map_server header) and `SERENO_BENCH_AT` (`x,y`) a free
-//! place on it. Without them a hall with pillars is drawn, and the place by lot.
+//! place on it. Without them it is the scanned hall that is developed against, where it is at hand, or else a drawn one with
+//! pillars, and the place by lot.
 #![allow(clippy::print_stdout, reason = "measurements")]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -18,7 +19,11 @@ const CLUSTER_M: f32 = 0.15;
 const CLUSTER_RAD: f32 = 0.05;
 
 fn named_plan() -> Option<(String, Plan)> {
-    let file = std::env::var("SERENO_BENCH_PLAN").ok()?;
+    let depot = || {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../../shared/maps/depot.yaml");
+        file.is_file().then(|| file.display().to_string())
+    };
+    let file = std::env::var("SERENO_BENCH_PLAN").ok().or_else(depot)?;
     let read = || {
         let header = PlanHeader::parse(&file, &std::fs::read(&file).ok()?).ok()?;
         let image = std::fs::read(Path::new(&file).parent()?.join(&header.image)).ok()?;
@@ -28,7 +33,8 @@ fn named_plan() -> Option<(String, Plan)> {
     if plan.is_none() {
         println!("{file} is no plan that can be read: a drawn hall is measured instead");
     }
-    plan.map(|plan| (file, plan))
+    let name = Path::new(&file).file_stem().map_or_else(String::new, |stem| stem.display().to_string());
+    plan.map(|plan| (name, plan))
 }
 
 fn drawn_hall() -> (String, Plan) {

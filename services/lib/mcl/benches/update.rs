@@ -11,29 +11,34 @@ use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The plan named by `SERENO_BENCH_PLAN` (a map_server header) with a place `SERENO_BENCH_AT` (`x,y`), or
-/// a drawn hall with pillars.
-fn plan() -> (String, Plan, (f32, f32)) {
-    let named = std::env::var("SERENO_BENCH_PLAN").ok().and_then(|file| {
-        let header = PlanHeader::parse(&file, &std::fs::read(&file).ok()?).ok()?;
-        let image = std::fs::read(Path::new(&file).parent()?.join(&header.image)).ok()?;
-        let plan = Plan::load(&file, &header, &image).ok()?;
-        let at = std::env::var("SERENO_BENCH_AT").ok()?;
-        let (x, y) = at.split_once(',')?;
-        Some((file, plan, (x.parse().ok()?, y.parse().ok()?)))
-    });
-    named.unwrap_or_else(|| {
-        let rows: Vec<String> = (0..200)
-            .map(|iy| {
-                let solid = |ix: usize| {
-                    [0, 199].contains(&ix) || [0, 199].contains(&iy) || (ix % 50 / 6 == 4 && iy % 50 / 6 == 4)
-                };
-                (0..200).map(|ix| if solid(ix) { '#' } else { ' ' }).collect()
-            })
-            .collect();
-        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
-        ("drawn".into(), Plan::from_ascii(&rows, 0.05), (5.0, 5.6))
-    })
+/// Places on the depot's plan: between shelves, in the open, near a corner.
+const DEPOT_AT: [(f32, f32); 3] = [(8.0, 5.0), (15.0, 8.0), (5.0, 5.0)];
+/// A place in the drawn hall, from where some cones meet pillars.
+const HALL_AT: [(f32, f32); 1] = [(5.0, 5.6)];
+
+fn read(file: &Path) -> Option<Plan> {
+    let name = file.display().to_string();
+    let header = PlanHeader::parse(&name, &std::fs::read(file).ok()?).ok()?;
+    let image = std::fs::read(file.parent()?.join(&header.image)).ok()?;
+    Plan::load(&name, &header, &image).ok()
+}
+
+/// The scanned hall that is developed against, where it is at hand, or a drawn hall with pillars.
+fn plan() -> (&'static str, Plan, &'static [(f32, f32)]) {
+    let depot = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../../shared/maps/depot.yaml");
+    if let Some(plan) = read(&depot) {
+        return ("depot", plan, &DEPOT_AT);
+    }
+    let rows: Vec<String> = (0..200)
+        .map(|iy| {
+            let solid = |ix: usize| {
+                [0, 199].contains(&ix) || [0, 199].contains(&iy) || (ix % 50 / 6 == 4 && iy % 50 / 6 == 4)
+            };
+            (0..200).map(|ix| if solid(ix) { '#' } else { ' ' }).collect()
+        })
+        .collect();
+    let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+    ("drawn hall", Plan::from_ascii(&rows, 0.05), &HALL_AT)
 }
 
 struct Columns([Vec<f32>; 8]);
@@ -50,15 +55,21 @@ impl Columns {
 }
 
 fn update(c: &mut Criterion) {
-    let (name, plan, (x, y)) = plan();
+    let (name, plan, places) = plan();
     let Ok(table) = ConeTable::new(Arc::new(plan), ConeModel::default()) else { return };
     let table = Arc::new(table);
-    let mut group = c.benchmark_group(format!("update, 8 ranges, {name}"));
+    for (x, y) in places {
+        update_at(c, name, &table, (*x, *y));
+    }
+}
+
+fn update_at(c: &mut Criterion, name: &str, table: &Arc<ConeTable>, (x, y): (f32, f32)) {
+    let mut group = c.benchmark_group(format!("update, 8 ranges, {name} at {x}, {y}"));
     for count in [500, 2_000, 10_000, 50_000] {
         let mut config = Config::default();
         config.population.min = count;
         config.population.max = count;
-        let Ok(mut filter) = Filter::new(config, Arc::clone(&table), count) else { return };
+        let Ok(mut filter) = Filter::new(config, Arc::clone(table), count) else { return };
         let mut generator = Generator::new(1);
         let columns = || Columns(std::array::from_fn(|_| vec![0.0; count]));
         let (mut old, mut new) = (columns(), columns());

@@ -13,6 +13,13 @@ const MUCH: f32 = 0.25;
 /// A door that was found shut so often is shut: somebody in it turns round sooner.
 const TRIED_ENOUGH: u32 = 3;
 
+/// An amnesty that was given and not yet carried out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pardon {
+    /// For doors that were found shut too.
+    doors: bool,
+}
+
 /// The amnesties of a round.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Amnesties {
@@ -39,8 +46,8 @@ impl Amnesties {
 }
 
 impl Journey {
-    /// What stood in the way may have moved on, and who stood in a door made it look shut: forgets them when rooms were left
-    /// out for that. Things a few times; doors until each was found shut thrice, and as often as things while much of the
+    /// What stood in the way may have moved on, and who stood in a door made it look shut: when rooms were left out for that
+    /// they are to be forgotten before the next planning, which the caller asks for. Things a few times; doors until each was found shut thrice, and as often as things while much of the
     /// building lies behind them: those first that were found shut least often.
     pub(crate) fn forgive(&mut self) -> bool {
         let patient = self.amnesties.left();
@@ -52,10 +59,16 @@ impl Journey {
             return false;
         }
         self.amnesties.give(self.looks.last().copied());
+        self.given_up.clear();
+        self.pardon = Some(Pardon { doors });
+        true
+    }
+
+    /// Forgets what an amnesty was given for. Works through the whole map: part of planning, never of a decision.
+    pub(super) fn pardon(&mut self, pardon: Pardon) {
         self.map.set_unmapped(&Bits::default());
         self.setbacks.forgive(|x, y| self.map.mark_unmapped(x, y));
-        self.given_up.clear();
-        if doors {
+        if pardon.doors {
             let times = |door: usize| self.found_shut.get(door).copied().unwrap_or_default();
             let least = self.least_found_shut();
             for door in 0..self.map.doors().len() {
@@ -65,7 +78,6 @@ impl Journey {
             }
             self.doors_again = true;
         }
-        true
     }
 
     /// How often that door was found shut which was found so least often, of those that count as shut.

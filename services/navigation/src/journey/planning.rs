@@ -22,6 +22,19 @@ impl Journey {
     pub fn work(&mut self, goal: Goal, place: &Place, pad: Option<(f32, f32)>) -> Work {
         match core::mem::replace(&mut self.stage, Stage::Idle) {
             Stage::Idle => Work::Idle,
+            Stage::Asked if self.afresh => {
+                self.afresh = false;
+                self.new_round();
+                self.stage = Stage::Asked;
+                Work::Busy
+            }
+            Stage::Asked if self.pardon.is_some() => {
+                if let Some(pardon) = self.pardon.take() {
+                    self.pardon(pardon);
+                }
+                self.stage = Stage::Asked;
+                Work::Busy
+            }
             Stage::Asked if self.review => {
                 self.review = false;
                 self.seen.restore(self.seen_before.words());
