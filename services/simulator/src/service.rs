@@ -140,7 +140,10 @@ impl Simulator {
             let _ = self.controller.write(&chunk[..count]);
         }
         let Some(flow) = &mut self.flow else { return };
-        open(&mut **flow, self.steps);
+        if open(&mut **flow, self.steps) {
+            // The sensor hears nothing; reading is how the device notices that its reader is gone.
+            let _ = flow.read(&mut chunk);
+        }
         loop {
             let count = self.flight.flow_read(&mut chunk);
             if count == 0 {
