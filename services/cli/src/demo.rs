@@ -5,13 +5,13 @@ use airframe::picture::Picture;
 use airframe::score::{FlightReport, Outcome};
 use anyhow::{Context, Result, bail};
 use cli::flight::{labels, vehicle_body, world};
+use cli::interrupt::Interrupt;
+use cli::orders::{Orders, next_order_number};
 use cli::place::Place;
-use cli::witness::{Orders, Witness, next_order_number};
+use cli::witness::Witness;
 use ipc_types::Verb;
 use runtime::{Cache, Tool};
 use std::process::{Child, Command, ExitCode, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// All services are ready within this time on a slow machine.
@@ -85,10 +85,7 @@ fn wait_until_ready(place: &Place, system: &mut System) -> Result<()> {
 }
 
 pub(crate) fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
-        signal_hook::flag::register(signal, Arc::clone(&stop))?;
-    }
+    let stop = Interrupt::catch()?;
     let mut system = System::start(place, demo.seed)?;
     wait_until_ready(place, &mut system)?;
     let flown = fly(place, demo, &stop, json);
@@ -100,7 +97,7 @@ pub(crate) fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
     Ok(if good || !demo.once { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn fly(place: &Place, demo: &Demo, stop: &AtomicBool, json: bool) -> Result<(FlightReport, String)> {
+fn fly(place: &Place, demo: &Demo, stop: &Interrupt, json: bool) -> Result<(FlightReport, String)> {
     let (manifest, root, run_dir) = place.running()?;
     let entry = manifest.services.get("simulator").context("the manifest has no simulator")?;
     let text = std::fs::read_to_string(root.join(&entry.config)).with_context(|| entry.config.clone())?;
@@ -118,7 +115,7 @@ fn fly(place: &Place, demo: &Demo, stop: &AtomicBool, json: bool) -> Result<(Fli
     let mut last_order = None::<Instant>;
     let mut last_line = Instant::now();
     let mut rest = None::<Instant>;
-    while began.elapsed() < Duration::from_secs(demo.patience) && !stop.load(Ordering::Relaxed) {
+    while began.elapsed() < Duration::from_secs(demo.patience) && !stop.came() {
         tool.tick();
         witness.look(&world);
         if !witness.flown() && last_order.is_none_or(|at| at.elapsed() > ORDER_AGAIN) {

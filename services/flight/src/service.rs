@@ -39,8 +39,8 @@ impl Service for Flight {
         Ok(Self {
             core: Core::new(&config, start.vehicle.battery.cells),
             device: ports.device("controller")?,
-            channels: ports.input(4)?,
-            ranges: ports.input(8)?,
+            channels: ports.input()?,
+            ranges: ports.input()?,
             attitude: ports.output()?,
             state: ports.output()?,
             power: ports.output()?,

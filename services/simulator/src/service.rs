@@ -56,7 +56,7 @@ impl Service for Simulator {
         }
         Ok(Self {
             flight: Simulation::in_world(world, &start.vehicle, &options),
-            pings: ports.input(8)?,
+            pings: ports.input()?,
             echoes: ports.output()?,
             truths: ports.output()?,
             controller,
