@@ -252,6 +252,8 @@ pub struct Ports {
     pub(crate) context: Rc<StepContext>,
     pub(crate) inputs: Vec<Rc<InputStats>>,
     pub(crate) outputs: Vec<Rc<OutputStats>>,
+    /// Topics that were opened, to read or to publish.
+    pub(crate) opened: Vec<String>,
     pub(crate) devices: Box<dyn Devices>,
     /// Topics for which the keeper holds something for this start of the service.
     pub(crate) retained: Vec<String>,
@@ -293,6 +295,7 @@ impl Ports {
             BusKind::Shared(node) => InputKind::Shared(node.input(topic, depth)?),
             BusKind::Lockstep(bus) => InputKind::Lockstep(bus.input(topic, depth, &self.service, wake)),
         };
+        self.opened.push(topic.to_owned());
         let stats = Rc::new(InputStats::default());
         self.inputs.push(Rc::clone(&stats));
         Ok(Input { kind, stats })
@@ -320,8 +323,27 @@ impl Ports {
         };
         let stats =
             Rc::new(OutputStats::with_deadline(access::deadline_ns(&self.manifest, &self.service, topic)));
+        self.opened.push(topic.to_owned());
         self.outputs.push(Rc::clone(&stats));
         Ok(Output { kind, context: Rc::clone(&self.context), sequence: Rc::new(Cell::new(0)), stats })
+    }
+
+    /// Checks that the service has opened every topic that the manifest lists for it: the picture of the wiring is
+    /// only worth something if it shows what is, no more and no less. Devices are left out, as a vehicle may lack one.
+    ///
+    /// # Errors
+    /// Names the first that was not opened.
+    pub(crate) fn check_all_opened(&self) -> Result<(), StartError> {
+        let Some(entry) = self.manifest.services.get(&self.service) else { return Ok(()) };
+        let read = entry.subscribes.keys().map(|topic| ("subscribes", topic));
+        let published = entry.publishes.keys().map(|topic| ("publishes", topic));
+        match read.chain(published).find(|(_, topic)| !self.opened.contains(topic)) {
+            None => Ok(()),
+            Some((how, topic)) => Err(StartError::Manifest(format!(
+                "{}: service.{}.{how}.\"{topic}\": the service does not open it; the manifest must not list it",
+                self.manifest.file, self.service
+            ))),
+        }
     }
 
     /// Whether the manifest gives this service the device.

@@ -163,12 +163,14 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
         context: Rc::clone(&context),
         inputs: Vec::new(),
         outputs: Vec::new(),
+        opened: Vec::new(),
         forgotten: Vec::new(),
         devices,
         retained: variable(env::RETAINED).unwrap_or_default().split(',').map(str::to_owned).collect(),
     };
     let mut journal = Journal::open(&mut ports, S::NAME)?;
     let mut service = S::start(config, &mut ports, &start)?;
+    ports.check_all_opened()?;
     journal.begin(&start, config_hash, &context);
     notifier.say("READY=1");
     tracing::info!("{} ready (start {incarnation})", S::NAME);
@@ -330,6 +332,7 @@ impl Tool {
             context,
             inputs: Vec::new(),
             outputs: Vec::new(),
+            opened: Vec::new(),
             forgotten: Vec::new(),
             devices: Box::new(crate::NoDevices),
             retained: Vec::new(),

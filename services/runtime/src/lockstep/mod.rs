@@ -155,6 +155,7 @@ impl Lockstep {
         )?;
         let mut ports = self.ports(S::NAME, incarnation);
         let service = S::start(config, &mut ports, &start)?;
+        ports.check_all_opened()?;
         // The first tick of each service falls somewhere within its first period.
         let phase = if period_ns == u64::MAX {
             u64::MAX
@@ -186,6 +187,7 @@ impl Lockstep {
             context,
             inputs: Vec::new(),
             outputs: Vec::new(),
+            opened: Vec::new(),
             forgotten: Vec::new(),
             devices: Box::new(NoDevices),
             retained,
