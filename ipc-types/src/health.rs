@@ -15,6 +15,12 @@ message! {
         pub lost: u64,
         /// Messages refused because they made no sense, since start.
         pub refused: u64,
+        /// Receives that shared memory refused since start.
+        pub unheard: u64,
+        /// Messages that found no free place, or that not every reader got, since start.
+        pub unsent: u64,
+        /// Silences longer than the deadline that the manifest sets for a published topic, since start.
+        pub missed: u64,
         /// Longest step since the last report, nanoseconds.
         pub longest_step_ns: u64,
         /// Mean step since the last report, nanoseconds.

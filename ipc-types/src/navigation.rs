@@ -192,6 +192,8 @@ message! {
     pub struct Patrol on "navigation/patrol" {
         /// When the round began.
         pub started_ns: u64,
+        /// Stamp of the newest operator command heard; 0 before any.
+        pub command_ns: u64,
         /// Filled waypoints; more than [`MAX_WAYPOINTS`] is a broken message.
         pub waypoints_used: u32,
         /// Next waypoint to reach.
@@ -214,12 +216,12 @@ message! {
         pub seen_origin_y_m: f32,
         /// Side of a bitmap cell.
         pub seen_cell_m: f32,
-        /// Last operator command obeyed (its sequence), so that a restart does not obey it twice.
+        /// Sequence of the last operator command heard: what `answer` is about, and what a restart does not obey twice.
         pub command_sequence: u32,
         /// For how long something has stood in the way, seconds: a restart goes on waiting where it was.
         pub waited_s: f32,
-        /// Zero.
-        pub reserved: u32,
+        /// An [`crate::Answer`] code: what became of the last command.
+        pub answer: u32,
         /// The route.
         pub waypoints: [Waypoint; 1024],
         /// The rooms.
@@ -228,6 +230,8 @@ message! {
         pub seen: [u64; 4096],
         /// Bit per cell of the same raster: something stands here that the plan does not show.
         pub unmapped: [u64; 4096],
+        /// The answer in one sentence.
+        pub answer_text: Text<96>,
         /// One sentence: what is being done and why.
         pub text: Text<128>,
     }

@@ -48,9 +48,31 @@ codes! {
     }
 }
 
+codes! {
+    /// What a service says of the last command that it heard.
+    pub enum Answer {
+        /// It has heard none.
+        None = 0 => "none",
+        /// Taken; whether it can be done is being worked out.
+        Working = 1 => "working it out",
+        /// It is being obeyed.
+        Accepted = 2 => "accepted",
+        /// It is not; a sentence says why.
+        Refused = 3 => "refused",
+    }
+}
+
+/// For how long a command may be obeyed after it was given, nanoseconds: a service that is restarted or a reader that
+/// joins late takes a tenth of it, and a person who sees nothing happen for two seconds gives another order.
+pub const COMMAND_LIFE_NS: u64 = 2_000_000_000;
+/// A command may be this much newer than the step that takes it, nanoseconds: a step reads the clock before its inputs.
+const COMMAND_AHEAD_NS: u64 = 100_000_000;
+
 message! {
     /// A command with who gave it.
     pub struct Command on "operator/command" {
+        /// Not to be obeyed at or after this time; at most [`COMMAND_LIFE_NS`] after the stamp.
+        pub expiry_ns: u64,
         /// Lease under which it is given; 0 for commands that need none.
         pub lease: u64,
         /// Plan frame, for `goto`; NaN otherwise.
@@ -65,5 +87,41 @@ message! {
         pub account: Text<32>,
         /// Role of the account.
         pub role: Text<16>,
+    }
+}
+
+impl Command {
+    /// Whether it may be obeyed at `now_ns` by somebody who has heard one of `newest_ns` (0 for none): it has not
+    /// expired, and no newer command has overtaken it. Every publisher's last command stays in its history, so that a
+    /// restarted service hears all of them again, in any order.
+    #[must_use]
+    pub fn counts(&self, now_ns: u64, newest_ns: u64) -> bool {
+        let given_ns = self.header.stamp_ns;
+        given_ns >= newest_ns
+            && given_ns <= now_ns.saturating_add(COMMAND_AHEAD_NS)
+            && now_ns < self.expiry_ns
+            && self.expiry_ns <= given_ns.saturating_add(COMMAND_LIFE_NS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_counts_for_a_while_and_until_a_newer_one() {
+        let given = 50_000_000_000;
+        let mut command = Command { expiry_ns: given + COMMAND_LIFE_NS, ..Command::default() };
+        command.header.stamp_ns = given;
+        assert!(command.counts(given, 0));
+        assert!(command.counts(given - COMMAND_AHEAD_NS, given));
+        assert!(command.counts(given + COMMAND_LIFE_NS - 1, given));
+        assert!(!command.counts(given + COMMAND_LIFE_NS, 0), "expired");
+        assert!(!command.counts(given + 1, given + 1), "overtaken");
+        assert!(!command.counts(given - COMMAND_AHEAD_NS - 1, 0), "from the future");
+        command.expiry_ns += 1;
+        assert!(!command.counts(given, 0), "nobody may order for longer");
+        command.expiry_ns = 0;
+        assert!(!command.counts(given, 0), "without an expiry");
     }
 }

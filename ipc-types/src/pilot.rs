@@ -127,9 +127,11 @@ message! {
         pub phase_since_ns: u64,
         /// When the failsafe began; 0 without one.
         pub failsafe_since_ns: u64,
+        /// Stamp of the newest operator command heard; 0 before any.
+        pub command_ns: u64,
         /// Causes that hold now: bit = [`FailsafeCause`] code.
         pub causes: u32,
-        /// Sequence of the last operator command obeyed.
+        /// Sequence of the last operator command heard: what `answer` is about.
         pub command_sequence: u32,
         /// A [`Phase`] code.
         pub phase: u8,
@@ -171,6 +173,12 @@ message! {
         pub hold_heading_rad: f32,
         /// Speed that the shield allows along the wished direction.
         pub shield_speed_m_s: f32,
+        /// An [`crate::Answer`] code: what became of the last command.
+        pub answer: u32,
+        /// Always zero.
+        pub reserved: u32,
+        /// The answer in one sentence.
+        pub answer_text: Text<96>,
         /// Who holds the sticks; empty for nobody.
         pub holder: Text<32>,
         /// One sentence for people.

@@ -39,6 +39,7 @@ pub(crate) struct Child {
     process: Option<std::process::Child>,
     pipes: [Option<File>; 2],
     status: String,
+    missed: u64,
     last_end: String,
     killed_because: Option<String>,
     last_line: String,
@@ -56,6 +57,7 @@ impl Child {
             process: None,
             pipes: [None, None],
             status: String::new(),
+            missed: 0,
             last_end: String::new(),
             killed_because: None,
             last_line: String::new(),
@@ -73,6 +75,10 @@ impl Child {
 
     pub(crate) fn said(&mut self, status: String) {
         self.status = status;
+    }
+
+    pub(crate) fn missed(&mut self, deadlines: u64) {
+        self.missed = deadlines;
     }
 
     /// Starts a process.
@@ -116,6 +122,7 @@ impl Child {
         });
         self.process = Some(process);
         self.status.clear();
+        self.missed = 0;
         self.last_line.clear();
         self.killed_because = None;
         self.life.spawned(now);
@@ -198,6 +205,7 @@ impl Child {
             restarts: self.life.restarts(),
             age_s: self.life.age(now).map(seconds),
             heartbeat_age_s: self.pid().and(self.life.beat_age(now)).map(seconds),
+            missed_deadlines: self.missed,
             criticality: self.entry.criticality.word().to_owned(),
             status: self.status.clone(),
             last_end: self.last_end.clone(),

@@ -29,7 +29,7 @@ mod supervisor;
 
 pub use client::{Client, ClientError};
 pub use error::SupervisorError;
-pub use options::{Options, default_run_dir, parse_arguments};
+pub use options::{Echo, Options, default_run_dir, parse_arguments};
 pub use shared::{NoSharedMemory, SharedMemory};
 
 use runtime::shm::RunDir;

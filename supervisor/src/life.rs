@@ -74,6 +74,7 @@ pub struct Life {
     spawns: u32,
     restarts: u32,
     spawned_at: Option<Instant>,
+    ready_at: Option<Instant>,
     beat_at: Option<Instant>,
 }
 
@@ -90,6 +91,7 @@ impl Life {
             spawns: 0,
             restarts: 0,
             spawned_at: None,
+            ready_at: None,
             beat_at: None,
         }
     }
@@ -131,6 +133,7 @@ impl Life {
         self.restarts += u32::from(self.spawns > 0);
         self.spawns += 1;
         self.spawned_at = Some(now);
+        self.ready_at = None;
         self.beat_at = None;
         self.state = State::Starting;
     }
@@ -138,6 +141,7 @@ impl Life {
     /// No process could be started: a short life.
     pub fn spawn_failed(&mut self, now: Instant) {
         self.spawned_at = Some(now);
+        self.ready_at = None;
         self.end_by_policy(false, now);
     }
 
@@ -145,6 +149,7 @@ impl Life {
     pub fn ready(&mut self, now: Instant) {
         if self.state == State::Starting {
             self.state = State::Running;
+            self.ready_at = Some(now);
             self.beat_at = Some(now);
         }
     }
@@ -181,7 +186,8 @@ impl Life {
     }
 
     fn end_by_policy(&mut self, success: bool, now: Instant) {
-        if self.spawned_at.is_some_and(|t| now.saturating_duration_since(t) >= self.limits.policy.healthy) {
+        // From when it was ready: a start that takes long and fails is no health.
+        if self.ready_at.is_some_and(|t| now.saturating_duration_since(t) >= self.limits.policy.healthy) {
             self.failures = 0;
         }
         let again = match self.restart {

@@ -20,6 +20,8 @@ pub(crate) struct Notification {
     pub(crate) beat: bool,
     /// `STATUS=...`.
     pub(crate) status: Option<String>,
+    /// `X_MISSED=...`: deadlines missed since start.
+    pub(crate) missed: Option<u64>,
     /// `STOPPING=1`.
     pub(crate) stopping: bool,
 }
@@ -33,6 +35,7 @@ impl Notification {
                 Some(("READY", "1")) => said.ready = true,
                 Some(("WATCHDOG", "1")) => said.beat = true,
                 Some(("STOPPING", "1")) => said.stopping = true,
+                Some(("X_MISSED", count)) => said.missed = count.parse().ok(),
                 Some(("STATUS", text)) => said.status = Some(text.chars().take(200).collect()),
                 _ => {}
             }
@@ -90,17 +93,24 @@ mod tests {
         let socket = NotifySocket::bind(&path).unwrap();
         assert_eq!(socket.receive(), None);
         let sender = UnixDatagram::unbound().unwrap();
-        sender.send_to(b"READY=1\nSTATUS=at work\nMAINPID=1", &path).unwrap();
+        sender.send_to(b"READY=1\nX_MISSED=7\nSTATUS=at work\nMAINPID=1", &path).unwrap();
         let (pid, said) = socket.receive().unwrap();
         assert_eq!(pid, std::process::id());
-        let wanted = Notification { ready: true, status: Some("at work".to_owned()), ..Default::default() };
+        let wanted = Notification {
+            ready: true,
+            missed: Some(7),
+            status: Some("at work".to_owned()),
+            ..Default::default()
+        };
         assert_eq!(said, wanted);
         assert_eq!(socket.receive(), None);
     }
 
     #[test]
     fn nonsense_says_nothing() {
-        for bytes in [&b""[..], b"\xff\xff", b"READY", b"READY=0", b"=", b"WATCHDOG=trigger\n\n\n"] {
+        for bytes in
+            [&b""[..], b"\xff\xff", b"READY", b"READY=0", b"=", b"WATCHDOG=trigger\n\n\n", b"X_MISSED=-1"]
+        {
             assert_eq!(Notification::parse(bytes), Notification::default());
         }
         assert!(Notification::parse(b"WATCHDOG=1").beat && Notification::parse(b"STOPPING=1").stopping);

@@ -4,6 +4,17 @@ use crate::SupervisorError;
 use std::path::PathBuf;
 use std::time::Duration;
 
+/// What becomes of the lines that services and supervisor print, besides being logged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Echo {
+    /// Nothing.
+    Silent,
+    /// `[service] line` on standard error, for people.
+    Text,
+    /// `{"service":...,"line":...}` a line on standard output, for programs.
+    Json,
+}
+
 /// How a system is to be run.
 #[derive(Debug, Clone)]
 pub struct Options {
@@ -20,8 +31,8 @@ pub struct Options {
     pub logs: Option<PathBuf>,
     /// Seed from which services derive theirs.
     pub seed: u64,
-    /// Repeat what services print on standard error.
-    pub echo: bool,
+    /// Whether and how to repeat what services print.
+    pub echo: Echo,
     /// How long a landing may take before the services are stopped all the same.
     pub land_limit: Duration,
     /// How long a service may take to end before it is killed.
@@ -39,7 +50,7 @@ impl Default for Options {
             programs: None,
             logs: None,
             seed: 1,
-            echo: false,
+            echo: Echo::Silent,
             // From 2.5 m (a ceiling) at the slowest allowed descent of 0.1 m/s, and a margin to settle.
             land_limit: Duration::from_secs(45),
             stop_limit: Duration::from_secs(2),
@@ -69,7 +80,7 @@ pub fn default_run_dir(name: &str) -> PathBuf {
 pub fn parse_arguments(arguments: impl Iterator<Item = String>) -> Result<Options, SupervisorError> {
     const USAGE: &str = "usage: sereno-supervisor [--run-dir DIR] [--programs DIR] [--logs DIR] [--seed N] [--quiet] MANIFEST [OVERLAY...]";
     let wrong = |what: String| SupervisorError::Usage(format!("{what}; {USAGE}"));
-    let mut options = Options { echo: true, ..Options::default() };
+    let mut options = Options { echo: Echo::Text, ..Options::default() };
     let mut arguments = arguments;
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| wrong(format!("{argument} needs a value")));
@@ -82,7 +93,7 @@ pub fn parse_arguments(arguments: impl Iterator<Item = String>) -> Result<Option
                 options.seed =
                     text.parse().map_err(|_| wrong(format!("--seed {text} is not a whole number")))?;
             }
-            "--quiet" => options.echo = false,
+            "--quiet" => options.echo = Echo::Silent,
             other if other.starts_with('-') => return Err(wrong(format!("unknown option {other}"))),
             path => options.manifests.push(path.into()),
         }

@@ -61,6 +61,8 @@ pub enum Response {
         pid: u32,
         /// Name of the system.
         system: String,
+        /// Its run directory, as it names things in shared memory by.
+        run_dir: String,
         /// Manifest and overlays it runs.
         manifests: Vec<String>,
         /// Whether the world is simulated.
@@ -109,6 +111,8 @@ pub struct ServiceRow {
     pub age_s: Option<f64>,
     /// Seconds since the last heartbeat.
     pub heartbeat_age_s: Option<f64>,
+    /// Silences longer than the manifest allows on the topics it publishes, since the last start.
+    pub missed_deadlines: u64,
     /// flight, mission or comfort.
     pub criticality: String,
     /// What it last said of itself.

@@ -1,7 +1,7 @@
 //! What the supervisor does with shared memory, behind a trait: process tests need none.
 
 use crate::SupervisorError;
-use ipc_types::{Command, Phase, Text, Verb};
+use ipc_types::{COMMAND_LIFE_NS, Command, Phase, Text, Verb};
 use manifest::Manifest;
 use runtime::shm::{Holder, RunDir};
 
@@ -12,6 +12,8 @@ pub trait SharedMemory {
     /// After `service` ended and was reaped: saves what it retained, cleans up what it left behind. Returns
     /// the retained topics that its next start will be offered.
     fn recover(&mut self, service: &str) -> Vec<String>;
+    /// Cleans up after dead programs that are no services. Called about once a second.
+    fn tidy(&mut self);
     /// Whether something flies, as the pilot last said.
     fn airborne(&self) -> bool;
     /// Tells the pilot to land; `sequence` is the same for repetitions of one order.
@@ -27,6 +29,7 @@ impl SharedMemory for NoSharedMemory {
     fn recover(&mut self, _service: &str) -> Vec<String> {
         Vec::new()
     }
+    fn tidy(&mut self) {}
     fn airborne(&self) -> bool {
         false
     }
@@ -53,6 +56,10 @@ impl SharedMemory for Held {
         topics
     }
 
+    fn tidy(&mut self) {
+        self.0.cleanup_dead_tools();
+    }
+
     fn airborne(&self) -> bool {
         // A phase that this build does not know is no reason to cut the motors.
         self.0
@@ -61,7 +68,9 @@ impl SharedMemory for Held {
     }
 
     fn land(&mut self, sequence: u32) {
+        let now = runtime::monotonic_ns();
         let command = Command {
+            expiry_ns: now.saturating_add(COMMAND_LIFE_NS),
             x_m: f32::NAN,
             y_m: f32::NAN,
             verb: u32::from(Verb::Land.code()),
@@ -71,6 +80,6 @@ impl SharedMemory for Held {
             ..Command::default()
         };
         // Not taken now: the order is repeated.
-        let _ = self.0.publish_command(&command, runtime::monotonic_ns());
+        let _ = self.0.publish_command(&command, now);
     }
 }

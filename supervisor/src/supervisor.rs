@@ -11,7 +11,7 @@ use crate::notify::NotifySocket;
 use crate::place::Place;
 use crate::shared::SharedMemory;
 use crate::signals::SignalPipe;
-use crate::{Options, SupervisorError, default_run_dir};
+use crate::{Echo, Options, SupervisorError, default_run_dir};
 use manifest::Manifest;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::Signal;
@@ -24,6 +24,9 @@ use std::time::{Duration, Instant};
 const KEEP: Duration = Duration::from_millis(20);
 /// The same while a restarted service waits for what was kept: adds this much to the time it is away.
 const KEEP_STARTING: Duration = Duration::from_millis(2);
+/// How often dead programs beside the services are cleaned up after: a topic has places for four publishers, and
+/// people do not start and kill three command lines within a second.
+const TIDY: Duration = Duration::from_secs(1);
 /// A loop that overslept so long was stopped itself, and so probably was everybody else.
 const OVERSLEPT: Duration = Duration::from_millis(200);
 /// How often the order to land is repeated: the pilot may be restarting.
@@ -132,6 +135,7 @@ impl<S: SharedMemory> Supervisor<S> {
     pub(crate) fn run(mut self) -> Result<(), SupervisorError> {
         self.say(&format!("{} in {}", self.manifest.system.name, self.place.path().display()));
         let mut planned = Instant::now();
+        let mut tidied = planned;
         loop {
             let now = Instant::now();
             if now > planned + OVERSLEPT {
@@ -149,6 +153,10 @@ impl<S: SharedMemory> Supervisor<S> {
             }
             self.act(now);
             self.shared.keep();
+            if now >= tidied + TIDY {
+                tidied = now;
+                self.shared.tidy();
+            }
             planned = self.wait()?;
         }
         self.say("stopped");
@@ -201,6 +209,9 @@ impl<S: SharedMemory> Supervisor<S> {
             }
             if said.beat {
                 child.life.beat(now);
+            }
+            if let Some(missed) = said.missed {
+                child.missed(missed);
             }
             if let Some(status) = said.status {
                 child.said(status);
@@ -375,15 +386,23 @@ fn own_directory() -> Result<PathBuf, SupervisorError> {
     Ok(own.parent().unwrap_or(Path::new("/")).to_owned())
 }
 
-/// A line on standard error, unless nobody takes it now: a paused terminal must not pause a flight.
-fn show(echo: bool, name: &str, line: &str) {
-    if !echo {
-        return;
+/// A line for whoever started the system, unless nobody takes it now: a paused terminal must not pause a flight.
+fn show(echo: Echo, name: &str, line: &str) {
+    match echo {
+        Echo::Silent => {}
+        Echo::Text => print(&mut std::io::stderr().lock(), &format!("[{name}] {line}\n")),
+        Echo::Json => {
+            let row = serde_json::json!({ "service": name, "line": line });
+            print(&mut std::io::stdout().lock(), &format!("{row}\n"));
+        }
     }
-    let stderr = std::io::stderr();
-    let mut ready = [PollFd::new(&stderr, PollFlags::OUT)];
+}
+
+fn print(stream: &mut (impl Write + std::os::fd::AsFd), text: &str) {
+    let mut ready = [PollFd::new(stream, PollFlags::OUT)];
     let at_once = Timespec { tv_sec: 0, tv_nsec: 0 };
     if poll(&mut ready, Some(&at_once)) == Ok(1) {
-        let _ = stderr.lock().write_all(format!("[{name}] {line}\n").as_bytes());
+        // Nobody listens any more: the system runs on.
+        let _ = stream.write_all(text.as_bytes());
     }
 }

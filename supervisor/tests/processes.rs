@@ -8,7 +8,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
-use supervisor::{ClientError, NoSharedMemory, Options, SupervisorError};
+use supervisor::{ClientError, Echo, NoSharedMemory, Options, SupervisorError};
 use system::{LONG, System, alive, exists, kill, wait_until};
 
 #[test]
@@ -295,7 +295,7 @@ fn what_cannot_run_is_said_in_one_sentence() {
 fn arguments_are_read_strictly() {
     let parse = |line: &str| supervisor::parse_arguments(line.split_whitespace().map(str::to_owned));
     let options = parse("--seed 7 --run-dir /r system.toml sim.toml --quiet").unwrap();
-    assert_eq!((options.seed, options.manifests.len(), options.echo), (7, 2, false));
+    assert_eq!((options.seed, options.manifests.len(), options.echo), (7, 2, Echo::Silent));
     for (line, says) in [
         ("", "no manifest given"),
         ("--seed x m", "--seed x is not a whole number"),

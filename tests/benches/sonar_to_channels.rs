@@ -93,7 +93,7 @@ struct Reader {
 
 impl Reader {
     fn open(tool: &mut Tool, service: &str, port: usize) -> Self {
-        let trace = tool.ports.input_of(&format!("{}/{service}", Trace::TOPIC), 16).unwrap();
+        let trace = tool.ports.input_of(&format!("{}/{service}", Trace::TOPIC)).unwrap();
         Self { trace, port, took: Stamps::new() }
     }
 
@@ -126,7 +126,7 @@ struct Steps {
 
 impl Steps {
     fn open(tool: &mut Tool, name: &'static str) -> Self {
-        let health = tool.ports.input_of(&format!("{}/{name}", Health::TOPIC), 16).unwrap();
+        let health = tool.ports.input_of(&format!("{}/{name}", Health::TOPIC)).unwrap();
         Self { name, health, step_ms: Vec::new(), late_ms: Vec::new() }
     }
 
@@ -165,7 +165,7 @@ fn main() {
     let length = std::env::var("SERENO_BENCH_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(60);
     let system = System::start(&sereno);
     let mut tool = patiently(|| system.join());
-    let mut state = tool.ports.input::<PilotState>(16).unwrap();
+    let mut state = tool.ports.input::<PilotState>().unwrap();
     patiently(|| {
         let phase = state.latest().and_then(|state| Phase::from_code(state.phase));
         if phase == Some(Phase::Grounded) {
@@ -175,8 +175,8 @@ fn main() {
         if phase == Some(Phase::Autonomous) { Ok(()) } else { Err(format!("phase {phase:?}")) }
     });
 
-    let mut ranges = tool.ports.input::<SonarRanges>(16).unwrap();
-    let mut channels = tool.ports.input::<Channels>(16).unwrap();
+    let mut ranges = tool.ports.input::<SonarRanges>().unwrap();
+    let mut channels = tool.ports.input::<Channels>().unwrap();
     let (mut ranges_sent, mut channels_sent) = (Stamps::new(), Stamps::new());
     let mut pilot = Reader::open(&mut tool, "pilot", 3);
     let mut localization = Reader::open(&mut tool, "localization", 0);

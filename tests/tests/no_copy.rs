@@ -27,8 +27,8 @@ publishes.'localization/particles' = { hz = 20 }
 [service.reader]
 run = "reader"
 tick_hz = 20
-subscribes.'localization/pose' = { depth = 2 }
-subscribes.'localization/particles' = { depth = 2 }
+subscribes.'localization/pose' = { depth = 1 }
+subscribes.'localization/particles' = { depth = 1 }
 "#;
 
 /// A shared-memory bus of this test's own.
@@ -56,7 +56,7 @@ impl Bus {
     }
 
     fn line<T: Message>(&self) -> (Output<T>, Input<T>) {
-        (self.ports("writer").output().unwrap(), self.ports("reader").input(1).unwrap())
+        (self.ports("writer").output().unwrap(), self.ports("reader").input().unwrap())
     }
 }
 
@@ -127,7 +127,7 @@ fn columns(set: &Particles) -> [&[f32; MAX_PARTICLES]; 8] {
 fn writer_and_readers_have_one_place_in_shared_memory() {
     let bus = Bus::new();
     let (mut output, mut one) = bus.line::<Particles>();
-    let mut other = bus.ports("reader").input::<Particles>(1).unwrap();
+    let mut other = bus.ports("reader").input::<Particles>().unwrap();
     for count in [500, MAX_PARTICLES] {
         let mut loan = output.loan().unwrap();
         write_little(&mut loan, count, 1.0);

@@ -82,13 +82,13 @@ fn main() -> Result<()> {
 fn fly(setup: &Setup, seed: u64, keep: usize) -> Result<String> {
     let mut flight = Flight::start(setup, seed)?;
     let mut ports = flight.bus.tool("cli");
-    let mut setpoints = ports.input::<Setpoint>(16)?;
-    let mut poses = ports.input::<Pose>(16)?;
-    let mut grids = ports.input::<Grid>(2)?;
-    let mut ranges = ports.input::<SonarRanges>(16)?;
-    let mut polars = ports.input::<Polar>(2)?;
-    let mut channels = ports.input::<Channels>(16)?;
-    let mut flows = ports.input::<FlowMotion>(16)?;
+    let mut setpoints = ports.input::<Setpoint>()?;
+    let mut poses = ports.input::<Pose>()?;
+    let mut grids = ports.input::<Grid>()?;
+    let mut ranges = ports.input::<SonarRanges>()?;
+    let mut polars = ports.input::<Polar>()?;
+    let mut channels = ports.input::<Channels>()?;
+    let mut flows = ports.input::<FlowMotion>()?;
     let mut kept: VecDeque<Line> = VecDeque::new();
     let mut line: Line = Line {
         truth: Truth::default(),

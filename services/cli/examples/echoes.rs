@@ -29,9 +29,9 @@ fn main() -> Result<()> {
     let plan = start.plan()?;
     let mut flight = Flight::start(&setup, seed)?;
     let mut ports = flight.bus.tool("cli");
-    let mut ranges = ports.input::<SonarRanges>(16)?;
-    let mut flows = ports.input::<FlowMotion>(16)?;
-    let mut poses = ports.input::<Pose>(16)?;
+    let mut ranges = ports.input::<SonarRanges>()?;
+    let mut flows = ports.input::<FlowMotion>()?;
+    let mut poses = ports.input::<Pose>()?;
     flight.run_for(6.0);
     flight.order(Verb::PatrolStart, f32::NAN, f32::NAN);
     flight.run_for(from - 6.0);

@@ -20,9 +20,9 @@ fn main() -> Result<()> {
     let mut flight = Flight::start(&setup, seed)?;
     println!("started in {:.2} s", began.elapsed().as_secs_f64());
     let mut ports = flight.bus.tool("cli");
-    let mut controller = ports.input::<FlightState>(4)?;
-    let mut setpoint = ports.input::<Setpoint>(16)?;
-    let mut poses = ports.input::<Pose>(16)?;
+    let mut controller = ports.input::<FlightState>()?;
+    let mut setpoint = ports.input::<Setpoint>()?;
+    let mut poses = ports.input::<Pose>()?;
     let (mut controller_said, mut wished, mut pose) =
         (FlightState::default(), Setpoint::default(), Pose::default());
     let began = std::time::Instant::now();

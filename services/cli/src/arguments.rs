@@ -105,8 +105,12 @@ impl From<PatrolOrder> for Order {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum TopicOrder {
-    /// List topics with their publishers and subscribers.
-    List,
+    /// List topics with their publishers and subscribers: of the running system, or of the manifest when none runs.
+    List {
+        /// When none runs: as the simulator overlays it.
+        #[arg(long)]
+        sim: bool,
+    },
     /// Print messages as they come, one JSON object a line.
     Echo {
         topic: String,

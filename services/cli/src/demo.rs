@@ -6,13 +6,13 @@ use airframe::picture::Picture;
 use airframe::score::{FlightReport, Outcome};
 use anyhow::{Context, Result, bail};
 use cli::flight::{labels, vehicle_body, world};
+use cli::interrupt::Interrupt;
+use cli::orders::{Orders, next_order_number};
 use cli::place::Place;
-use cli::witness::{Orders, Witness, next_order_number};
+use cli::witness::Witness;
 use ipc_types::Verb;
 use runtime::{Cache, Tool};
 use std::process::{Child, Command, ExitCode, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// All services are ready within this time on a slow machine.
@@ -86,10 +86,7 @@ fn wait_until_ready(place: &Place, system: &mut System) -> Result<()> {
 }
 
 pub(crate) fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
-        signal_hook::flag::register(signal, Arc::clone(&stop))?;
-    }
+    let stop = Interrupt::catch()?;
     let mut system = System::start(place, demo.seed)?;
     wait_until_ready(place, &mut system)?;
     let mut kills = (demo.kills > 0)
@@ -114,7 +111,7 @@ fn fly(
     place: &Place,
     demo: &Demo,
     mut kills: Option<&mut Kills>,
-    stop: &AtomicBool,
+    stop: &Interrupt,
     json: bool,
 ) -> Result<(FlightReport, String)> {
     let (manifest, root, run_dir) = place.running()?;
@@ -134,7 +131,7 @@ fn fly(
     let mut last_order = None::<Instant>;
     let mut last_line = Instant::now();
     let mut rest = None::<Instant>;
-    while began.elapsed() < Duration::from_secs(demo.patience) && !stop.load(Ordering::Relaxed) {
+    while began.elapsed() < Duration::from_secs(demo.patience) && !stop.came() {
         tool.tick();
         witness.look(&world);
         if witness.last_truth.is_some_and(|truth| truth.header.incarnation > 0) {

@@ -1,6 +1,7 @@
 //! A whole flight in lockstep: every service of the manifest, one simulated round.
 
-use crate::witness::{Orders, Witness};
+use crate::orders::Orders;
+use crate::witness::Witness;
 use airframe::picture::Picture;
 use airframe::score::FlightScore;
 use airframe::world::World;

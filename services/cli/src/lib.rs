@@ -2,5 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod flight;
+pub mod interrupt;
+pub mod orders;
 pub mod place;
 pub mod witness;

@@ -19,7 +19,7 @@ fn main() -> ExitCode {
     let place = &arguments.place;
     let json = arguments.json;
     let done = match &arguments.verb {
-        Verb::Up(up) => system::up(place, up),
+        Verb::Up(up) => system::up(place, up, json),
         Verb::Ps => system::ps(place, json),
         Verb::Restart { service, in_flight } => system::restart(place, service, *in_flight, json),
         Verb::Hold { service: Some(service), in_flight } => system::hold(place, service, *in_flight, json),

@@ -1,14 +1,17 @@
-//! Orders to the drone. Every order is acknowledged by the service that obeys it, or refused in words.
+//! Orders to the drone. Every order is acknowledged by all services that must obey it, or refused in words.
 
 use anyhow::{Result, bail};
+use cli::interrupt::Interrupt;
+use cli::orders::{Orders, Replies, Reply, next_order_number};
 use cli::place::Place;
-use cli::witness::{Orders, next_order_number};
 use ipc_types::Verb;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Pilot and navigation publish their state at least twice a second.
+/// An order is obeyed within two seconds or not at all, and is answered in the same step.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// For as long a route to one place is waited for; navigation works at it in slices, 20 a second.
+const PLANNING: Duration = Duration::from_secs(10);
 const GLANCE: Duration = Duration::from_millis(10);
 
 /// What an operator may order.
@@ -41,27 +44,66 @@ impl Order {
 }
 
 pub(crate) fn give(place: &Place, order: Order, json: bool) -> Result<ExitCode> {
-    let (manifest, _, run_dir) = place.running()?;
-    let mut tool = runtime::Tool::join("cli", manifest, &run_dir)?;
-    let mut orders = Orders::open(&mut tool.ports)?;
     let (verb, x, y) = order.verb();
     if matches!(order, Order::GoTo(..)) && !(x.is_finite() && y.is_finite()) {
         bail!("a place is two finite numbers of metres on the plan, not {x} {y}");
     }
+    let stop = Interrupt::catch()?;
+    let (manifest, _, run_dir) = place.running()?;
+    let mut tool = runtime::Tool::join("cli", manifest, &run_dir)?;
     let number = next_order_number();
-    orders.give(verb, x, y, number);
+    let mut replies = Replies::open(&mut tool.ports, verb, number)?;
+    let mut orders = Orders::open(&mut tool.ports)?;
+    tool.tick();
+    if !orders.give(verb, x, y, number) {
+        bail!("{verb}: shared memory has no place for the order");
+    }
     let began = Instant::now();
-    while began.elapsed() < PATIENCE {
-        tool.tick();
-        if let Some(text) = orders.answer(number) {
-            if json {
-                println!("{}", serde_json::json!({ "order": verb.word(), "answer": text }));
-            } else {
-                println!("{verb}: {text}");
-            }
-            return Ok(ExitCode::SUCCESS);
+    while !replies.look() {
+        let silent = replies.iter().any(|(_, reply)| *reply == Reply::Silent);
+        if began.elapsed() > if silent { PATIENCE } else { PLANNING } {
+            break;
+        }
+        if stop.came() {
+            bail!("{verb}: interrupted; whether it is obeyed is not known: see `sereno ps`");
         }
         std::thread::sleep(GLANCE);
+        tool.tick();
     }
-    bail!("{verb}: the pilot did not answer within {} s: see `sereno ps`", PATIENCE.as_secs());
+    report(verb, &replies, json)
+}
+
+/// Says what came of it: one line, or one sentence and a failure.
+fn report(verb: Verb, replies: &Replies, json: bool) -> Result<ExitCode> {
+    let mut trouble = Vec::new();
+    for (who, reply) in replies.iter() {
+        match reply {
+            Reply::Accepted(_) => {}
+            Reply::Refused(text) => trouble.push(format!("{who} {text}")),
+            Reply::Working(_) => trouble.push(format!(
+                "{who} has not worked out a route within {} s and is still at it",
+                PLANNING.as_secs()
+            )),
+            Reply::Silent => trouble.push(format!("{who} did not answer within {} s", PATIENCE.as_secs())),
+        }
+    }
+    let trouble = trouble.join("; ");
+    if json {
+        let said: serde_json::Map<_, _> = replies
+            .iter()
+            .map(|(who, reply)| {
+                let said = serde_json::json!({ "answer": reply.word(), "text": reply.sentence() });
+                (who.to_owned(), said)
+            })
+            .collect();
+        let accepted = trouble.is_empty();
+        println!("{}", serde_json::json!({ "order": verb.word(), "accepted": accepted, "answers": said }));
+    } else if trouble.is_empty() {
+        let said: Vec<_> = replies.iter().map(|(who, reply)| format!("{who} {}", reply.sentence())).collect();
+        println!("{verb}: {}", said.join("; "));
+    }
+    if !trouble.is_empty() {
+        bail!("{verb}: {trouble}");
+    }
+    Ok(ExitCode::SUCCESS)
 }

@@ -84,11 +84,13 @@ impl Place {
         let run_dir = self.run_dir()?;
         let mut client = supervisor::Client::connect(&run_dir)?;
         let answer = client.ask(&supervisor::protocol::Request::Ping)?;
-        let supervisor::protocol::Response::Pong { manifests, .. } = answer else {
+        let supervisor::protocol::Response::Pong { manifests, run_dir, .. } = answer else {
             bail!("the supervisor answers something else than asked");
         };
         let (manifest, root) = runtime::load_manifest(&manifests.join(":"))?;
-        Ok((manifest, root, runtime::shm::RunDir::new(std::path::absolute(run_dir)?)))
+        // As the supervisor calls it: what is in shared memory is named after that, and links lead to the same place
+        // under other names.
+        Ok((manifest, root, runtime::shm::RunDir::new(run_dir)))
     }
 }
 

@@ -3,26 +3,35 @@
 use crate::arguments::Up;
 use anyhow::Result;
 use cli::place::Place;
+use std::io::Write;
 use std::process::ExitCode;
 use std::time::Duration;
-use supervisor::Client;
 use supervisor::protocol::ServiceRow;
+use supervisor::{Client, Echo};
 
 /// A service that does not come up within this time is reported.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// A landing from any height and the end of all services.
 const DOWN_PATIENCE: Duration = Duration::from_secs(90);
 
-pub(crate) fn up(place: &Place, up: &Up) -> Result<ExitCode> {
+pub(crate) fn up(place: &Place, up: &Up, json: bool) -> Result<ExitCode> {
     let options = supervisor::Options {
         manifests: place.manifest_files(up.sim)?,
         run_dir: Some(place.run_dir()?),
         logs: up.logs.clone(),
         seed: up.seed,
-        echo: !up.quiet,
+        echo: match (up.quiet, json) {
+            (true, _) => Echo::Silent,
+            (false, true) => Echo::Json,
+            (false, false) => Echo::Text,
+        },
         ..supervisor::Options::default()
     };
     supervisor::run(&options)?;
+    if json {
+        // Whoever listened may have gone before the system.
+        let _ = writeln!(std::io::stdout(), "{{\"stopped\":true}}");
+    }
     Ok(ExitCode::SUCCESS)
 }
 
@@ -31,12 +40,18 @@ fn client(place: &Place) -> Result<Client> {
 }
 
 fn print_rows(rows: &[ServiceRow]) {
-    println!("{:<14} {:<9} {:>8} {:>8} {:>9}  what it says", "service", "state", "pid", "restarts", "up s");
+    println!(
+        "{:<14} {:<9} {:>8} {:>8} {:>9} {:>5}  what it says",
+        "service", "state", "pid", "restarts", "up s", "late"
+    );
     for row in rows {
         let pid = row.pid.map_or_else(|| "-".to_owned(), |pid| pid.to_string());
         let age = row.age_s.map_or_else(|| "-".to_owned(), |age| format!("{age:.1}"));
         let says = if row.status.is_empty() { &row.last_end } else { &row.status };
-        println!("{:<14} {:<9} {pid:>8} {:>8} {age:>9}  {says}", row.name, row.state, row.restarts);
+        println!(
+            "{:<14} {:<9} {pid:>8} {:>8} {age:>9} {:>5}  {says}",
+            row.name, row.state, row.restarts, row.missed_deadlines
+        );
     }
 }
 

@@ -2,9 +2,11 @@
 
 use crate::arguments::TopicOrder;
 use anyhow::{Context, Result};
+use cli::interrupt::Interrupt;
 use cli::place::Place;
 use ipc_types::{Message, TopicVisitor, visit_topic};
 use runtime::{Input, Ports, Tool};
+use std::io::Write;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -13,14 +15,18 @@ const GLANCE: Duration = Duration::from_millis(2);
 
 pub(crate) fn run(place: &Place, order: &TopicOrder, json: bool) -> Result<ExitCode> {
     match order {
-        TopicOrder::List => list(place, json),
+        TopicOrder::List { sim } => list(place, *sim, json),
         TopicOrder::Echo { topic, count } => watch(place, topic, What::Echo(*count)),
         TopicOrder::Hz { topic, seconds } => watch(place, topic, What::Rate(*seconds, json)),
     }
 }
 
-fn list(place: &Place, json: bool) -> Result<ExitCode> {
-    let (manifest, _) = place.manifest(true)?;
+fn list(place: &Place, sim: bool, json: bool) -> Result<ExitCode> {
+    // What runs, and where nothing does, what would: the simulator's topics are there in a simulation only.
+    let manifest = match place.running() {
+        Ok((manifest, ..)) => manifest,
+        Err(_) => place.manifest(sim)?.0,
+    };
     for topic in manifest.topics() {
         if json {
             let row = serde_json::json!({ "topic": topic.name, "hz": topic.hz, "publishers": topic.publishers,
@@ -41,9 +47,10 @@ enum What {
 }
 
 fn watch(place: &Place, topic: &str, what: What) -> Result<ExitCode> {
+    let stop = Interrupt::catch()?;
     let (manifest, _, run_dir) = place.running()?;
     let mut tool = Tool::join("cli", manifest, &run_dir)?;
-    let mut watch = Watch { ports: &mut tool.ports, topic, what };
+    let mut watch = Watch { ports: &mut tool.ports, topic, what, stop: &stop };
     visit_topic(topic, &mut watch)
         .with_context(|| format!("there is no topic {topic}: see `sereno topic list`"))?
 }
@@ -52,41 +59,47 @@ struct Watch<'a> {
     ports: &'a mut Ports,
     topic: &'a str,
     what: What,
+    stop: &'a Interrupt,
 }
 
 impl TopicVisitor for Watch<'_> {
     type Output = Result<ExitCode>;
     fn visit<T: Message>(&mut self) -> Self::Output {
-        let mut input = self.ports.input_of::<T>(self.topic, 16)?;
+        let mut input = self.ports.input_of::<T>(self.topic)?;
         match self.what {
-            What::Echo(count) => echo(&mut input, count),
-            What::Rate(seconds, json) => rate(&mut input, self.topic, seconds, json),
+            What::Echo(count) => echo(&mut input, count, self.stop)?,
+            What::Rate(seconds, json) => rate(&mut input, self.topic, seconds, json, self.stop),
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-fn echo<T: Message>(input: &mut Input<T>, count: Option<u64>) {
+fn echo<T: Message>(input: &mut Input<T>, count: Option<u64>, stop: &Interrupt) -> Result<()> {
     let mut shown = 0;
     let mut text = String::new();
-    while count.is_none_or(|count| shown < count) {
-        match input.receive() {
-            Some(message) => {
-                text.clear();
-                // Writing into a String cannot fail.
-                let _ = message.write_json(&mut text);
-                println!("{text}");
-                shown += 1;
-            }
-            None => std::thread::sleep(GLANCE),
+    while !stop.came() && count.is_none_or(|count| shown < count) {
+        let Some(message) = input.receive() else {
+            std::thread::sleep(GLANCE);
+            continue;
+        };
+        text.clear();
+        // Writing into a String cannot fail.
+        let _ = message.write_json(&mut text);
+        text.push('\n');
+        match std::io::stdout().write_all(text.as_bytes()) {
+            Ok(()) => shown += 1,
+            // Whoever reads has seen enough: `| head`.
+            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => break,
+            Err(error) => return Err(error).context("cannot print"),
         }
     }
+    Ok(())
 }
 
-fn rate<T: Message>(input: &mut Input<T>, topic: &str, seconds: f64, json: bool) {
+fn rate<T: Message>(input: &mut Input<T>, topic: &str, seconds: f64, json: bool, stop: &Interrupt) {
     let began = Instant::now();
     let mut stamps = Vec::new();
-    while began.elapsed().as_secs_f64() < seconds {
+    while !stop.came() && began.elapsed().as_secs_f64() < seconds {
         match input.receive() {
             Some(message) => stamps.push(message.header().stamp_ns),
             None => std::thread::sleep(GLANCE),

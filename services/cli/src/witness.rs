@@ -4,58 +4,11 @@ use airframe::picture::Track;
 use airframe::score::{Ending, FlightScore, Observation, Scorer};
 use airframe::world::World;
 use ipc_types::{
-    Command, FailsafeAction, FailsafeCause, Patrol, PatrolState, Phase, PilotState, Pose, RoomState, Text,
-    Truth, Verb,
+    FailsafeAction, FailsafeCause, Patrol, PatrolState, Phase, PilotState, Pose, RoomState, Truth,
 };
 use manifest::Body;
-use runtime::{Input, Output, Ports, StartError};
+use runtime::{Input, Ports, StartError};
 use std::collections::VecDeque;
-
-/// A number for an order that no earlier order of anybody had: obeyed once, whoever hears it again.
-#[must_use]
-pub fn next_order_number() -> u32 {
-    // Milliseconds of the monotonic clock differ between any two orders of people; never zero.
-    (runtime::monotonic_ns() / 1_000_000) as u32 | 1
-}
-
-/// Orders to the drone, and who obeyed them.
-pub struct Orders {
-    command: Output<Command>,
-    pilot: Input<PilotState>,
-    pilot_said: Option<(u32, String)>,
-}
-
-impl Orders {
-    /// Opens the ports of an operator.
-    ///
-    /// # Errors
-    /// When the manifest does not allow it.
-    pub fn open(ports: &mut Ports) -> Result<Self, StartError> {
-        Ok(Self { command: ports.output()?, pilot: ports.input(16)?, pilot_said: None })
-    }
-
-    /// Gives an order as the local operator.
-    pub fn give(&mut self, verb: Verb, x_m: f32, y_m: f32, number: u32) {
-        self.command.publish(&Command {
-            x_m,
-            y_m,
-            verb: u32::from(verb.code()),
-            command_sequence: number,
-            account: Text::new("local"),
-            role: Text::new("administrator"),
-            ..Command::default()
-        });
-    }
-
-    /// What the pilot says of order `number`; `None` while it has not taken it.
-    pub fn answer(&mut self, number: u32) -> Option<String> {
-        while let Some(state) = self.pilot.receive() {
-            self.pilot_said = Some((state.command_sequence, state.text.as_str().to_owned()));
-        }
-        let (taken, text) = self.pilot_said.as_ref()?;
-        (*taken == number).then(|| text.clone())
-    }
-}
 
 /// Truth kept while estimates for its times may still come, seconds times 50 Hz.
 const TRUTH_KEPT: usize = 64;
@@ -106,10 +59,10 @@ impl Witness {
     /// When the manifest does not allow it.
     pub fn open(ports: &mut Ports, world: &World, body: Body) -> Result<Self, StartError> {
         Ok(Self {
-            truth: ports.input(16)?,
-            pose: ports.input(16)?,
-            pilot: ports.input(16)?,
-            patrol: ports.input(2)?,
+            truth: ports.input()?,
+            pose: ports.input()?,
+            pilot: ports.input()?,
+            patrol: ports.input()?,
             recent: VecDeque::with_capacity(TRUTH_KEPT),
             last_truth: None,
             last_pose: None,

@@ -53,8 +53,8 @@ fn the_same_seed_is_the_same_flight_byte_for_byte() {
         let mut flight = Flight::start(&setup, seed).unwrap();
         let mut bytes = Vec::new();
         let mut tool = flight.bus.tool("cli");
-        let _grids = watched.then(|| tool.input::<Grid>(2).unwrap());
-        let _polars = watched.then(|| tool.input::<Polar>(2).unwrap());
+        let _grids = watched.then(|| tool.input::<Grid>().unwrap());
+        let _polars = watched.then(|| tool.input::<Polar>().unwrap());
         flight.run_for(6.0);
         flight.order(Verb::PatrolStart, f32::NAN, f32::NAN);
         for _ in 0..60 {

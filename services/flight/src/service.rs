@@ -22,7 +22,8 @@ pub struct Flight {
     attitude: Output<Attitude>,
     state: Output<FlightState>,
     power: Output<Power>,
-    lost_ns: u64,
+    /// When the port was lost; the first step, before it ever was open.
+    lost_ns: Option<u64>,
     retry_ns: u64,
     reported_ns: Option<u64>,
     reported: (u8, u8, u8),
@@ -38,12 +39,12 @@ impl Service for Flight {
         Ok(Self {
             core: Core::new(&config, start.vehicle.battery.cells),
             device: ports.device("controller")?,
-            channels: ports.input(4)?,
-            ranges: ports.input(8)?,
+            channels: ports.input()?,
+            ranges: ports.input()?,
             attitude: ports.output()?,
             state: ports.output()?,
             power: ports.output()?,
-            lost_ns: 0,
+            lost_ns: None,
             retry_ns: 0,
             reported_ns: None,
             reported: (0, 0, 0),
@@ -107,11 +108,12 @@ impl Flight {
 
     fn lost(&mut self, now: u64, reason: &str) {
         if self.core.is_open() {
-            self.lost_ns = now;
+            self.lost_ns = Some(now);
         }
         self.device.close();
         self.core.closed(reason);
-        let soon = now.saturating_sub(self.lost_ns) < SOON_FOR_NS;
+        // Started again in the air, it may find the port still claimed by the process that was killed.
+        let soon = now.saturating_sub(*self.lost_ns.get_or_insert(now)) < SOON_FOR_NS;
         self.retry_ns = now + if soon { RETRY_SOON_NS } else { RETRY_LATER_NS };
     }
 

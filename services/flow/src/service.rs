@@ -60,8 +60,8 @@ impl Service for Flow {
         };
         Ok(Self {
             fitted,
-            attitudes: ports.input(8)?,
-            ranges: ports.input(8)?,
+            attitudes: ports.input()?,
+            ranges: ports.input()?,
             output: ports.output()?,
             now: 0,
             quality: 0,

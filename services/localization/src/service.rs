@@ -94,11 +94,11 @@ impl Service for Localization {
             Filter::new(config.filter(), Arc::clone(&table), MAX_PARTICLES).map_err(StartError::invalid)?;
         let clutter = Clutter::new(table.plan(), start.sidecar()?.doors);
         let mut service = Self {
-            ranges: ports.input(8)?,
-            attitude: ports.input(16)?,
-            flow: ports.input(16)?,
-            pilot: ports.input(4)?,
-            sets: ports.input(1)?,
+            ranges: ports.input()?,
+            attitude: ports.input()?,
+            flow: ports.input()?,
+            pilot: ports.input()?,
+            sets: ports.input()?,
             poses: ports.output()?,
             particles: ports.output()?,
             config,

@@ -122,7 +122,7 @@ impl Bench {
             attitude: world.output().unwrap(),
             flow: world.output().unwrap(),
             pilot: world.output().unwrap(),
-            poses: world.input(16).unwrap(),
+            poses: world.input().unwrap(),
             system,
             plan: Plan::from_ascii(&rows.iter().map(String::as_str).collect::<Vec<_>>(), 0.05),
             group: 0,

@@ -4,7 +4,7 @@ use crate::atlas::Atlas;
 use crate::blockage::{Blockage, Verdict};
 use crate::config::NavigationConfig;
 use crate::journey::{Journey, Work};
-use crate::mission::{Event, Goal, Intent, Mission, Nonsense};
+use crate::mission::{Event, Goal, Heard, Intent, Mission, Nonsense};
 use crate::place::Place;
 use crate::senses::Senses;
 use crate::steer::{Craft, Scene, Steer, Steering};
@@ -13,8 +13,8 @@ use avoid::grid::{insert, scroll};
 use avoid::{CELL_M, CELLS, GridRules, Histogram, SIDE, WallLayer, Window};
 use floorplan::Cell;
 use ipc_types::{
-    Command, Grid, Patrol, PilotState, Polar, Pose, Setpoint, SetpointKind, SonarRanges, SteeringReason,
-    Text, seconds_between,
+    Answer, Command, Grid, Patrol, PilotState, Polar, Pose, Setpoint, SetpointKind, SonarRanges,
+    SteeringReason, Text, seconds_between,
 };
 use std::sync::Arc;
 
@@ -47,6 +47,7 @@ pub struct Core {
     stand: Option<(f32, f32)>,
     last_ns: Option<u64>,
     pub(crate) text: Text<128>,
+    pub(crate) answer: Text<96>,
     started_ns: u64,
     refused: u64,
 }
@@ -77,6 +78,7 @@ impl Core {
             stand: None,
             last_ns: None,
             text: Text::new("waiting for a command"),
+            answer: Text::default(),
             started_ns: 0,
             refused: 0,
         })
@@ -107,12 +109,20 @@ impl Core {
     }
 
     /// After a restart: goes on with the round that the keeper holds, if it is for this plan.
-    pub fn resume(&mut self, patrol: &Patrol) {
+    pub fn resume(&mut self, now: u64, patrol: &Patrol) {
         match self.journey.restore(patrol) {
             Ok((state, there)) => {
                 self.started_ns = patrol.started_ns;
                 self.waited_before_s = if patrol.waited_s.is_finite() { patrol.waited_s } else { 0.0 };
-                self.mission.restore(state, (patrol.pad_x_m, patrol.pad_y_m), there, patrol.command_sequence);
+                let answer = u8::try_from(patrol.answer).ok().and_then(Answer::from_code);
+                let heard = Heard {
+                    sequence: patrol.command_sequence,
+                    // A time that has not come yet would shut out every later order.
+                    stamp_ns: patrol.command_ns.min(now),
+                    answer: answer.unwrap_or(Answer::None),
+                };
+                self.answer = patrol.answer_text;
+                self.mission.restore(state, (patrol.pad_x_m, patrol.pad_y_m), there, heard);
             }
             Err(Nonsense) => self.refused += 1,
         }
@@ -151,8 +161,12 @@ impl Core {
     }
 
     /// An operator's command.
-    pub fn command(&mut self, command: &Command) {
-        let obeyed = self.mission.obey(command, self.place.as_ref());
+    pub fn command(&mut self, now: u64, command: &Command) {
+        let before = self.mission.heard();
+        let obeyed = self.mission.obey(now, command, self.place.as_ref());
+        if self.mission.heard() != before {
+            self.say_answer("there is no round to pause");
+        }
         self.act(obeyed);
     }
 
@@ -249,6 +263,7 @@ impl Core {
         let Some(place) = self.fresh_place(now) else {
             return;
         };
+        let before = self.mission.heard();
         match self.journey.work(self.mission.goal(), &place, self.mission.pad()) {
             Work::Ready => {
                 self.mission.route_ready();
@@ -257,6 +272,10 @@ impl Core {
             }
             Work::NoWay => self.mission.no_way(Some(&place)),
             Work::Idle | Work::Busy => {}
+        }
+        if self.mission.heard() != before {
+            let trouble = Text::<64>::new(self.journey.trouble());
+            self.say_answer(trouble.as_str());
         }
     }
 
@@ -390,7 +409,11 @@ impl Core {
         patrol.started_ns = self.started_ns;
         patrol.state = u32::from(self.mission.state().code());
         (patrol.pad_x_m, patrol.pad_y_m) = self.mission.pad().unwrap_or((f32::NAN, f32::NAN));
-        patrol.command_sequence = self.mission.command();
+        let heard = self.mission.heard();
+        patrol.command_ns = heard.stamp_ns;
+        patrol.command_sequence = heard.sequence;
+        patrol.answer = u32::from(heard.answer.code());
+        patrol.answer_text = self.answer;
         patrol.waited_s = self.blockage.waited_s().max(self.waited_before_s);
         patrol.text = self.text;
     }

@@ -2,7 +2,7 @@
 //! any route in it.
 
 use crate::place::Place;
-use ipc_types::{Command, FailsafeAction, PatrolState, Phase, PilotState, Verb};
+use ipc_types::{Answer, Command, FailsafeAction, PatrolState, Phase, PilotState, Verb};
 
 /// Slow enough over the pad to come down, metres a second.
 const STILL_M_S: f32 = 0.12;
@@ -50,13 +50,23 @@ pub enum Event {
     Drop,
 }
 
+/// The last command that was heard, and what became of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Heard {
+    /// Its sequence.
+    pub sequence: u32,
+    /// Its stamp, nanoseconds.
+    pub stamp_ns: u64,
+    /// What became of it.
+    pub answer: Answer,
+}
+
 /// The state machine.
 #[derive(Clone, Debug)]
 pub struct Mission {
     state: PatrolState,
     goal: Goal,
-    /// Whether the last command that was obeyed has been seen, and its number.
-    command: Option<u32>,
+    heard: Option<Heard>,
     pad: Option<(f32, f32)>,
     hold: Option<(f32, f32)>,
     phase: Phase,
@@ -74,7 +84,7 @@ impl Mission {
         Self {
             state: PatrolState::Idle,
             goal: Goal::None,
-            command: None,
+            heard: None,
             pad,
             hold: None,
             phase: Phase::Grounded,
@@ -87,8 +97,8 @@ impl Mission {
     }
 
     /// After a restart: where things stood. Something under way is planned again from where the drone is.
-    pub fn restore(&mut self, state: PatrolState, pad: (f32, f32), there: Option<(f32, f32)>, command: u32) {
-        self.command = Some(command);
+    pub fn restore(&mut self, state: PatrolState, pad: (f32, f32), there: Option<(f32, f32)>, heard: Heard) {
+        self.heard = Some(heard);
         if pad.0.is_finite() && pad.1.is_finite() {
             self.pad = Some(pad);
         }
@@ -121,10 +131,10 @@ impl Mission {
         self.pad
     }
 
-    /// Number of the last command obeyed; 0 before any.
+    /// The last command heard; number 0 before any.
     #[must_use]
-    pub fn command(&self) -> u32 {
-        self.command.unwrap_or(0)
+    pub fn heard(&self) -> Heard {
+        self.heard.unwrap_or(Heard { sequence: 0, stamp_ns: 0, answer: Answer::None })
     }
 
     /// The pilot's phase.
@@ -152,26 +162,39 @@ impl Mission {
         )
     }
 
-    /// Obeys a command once. `Err(())` when it makes no sense (counted by the caller).
+    /// Obeys a command, once and in time. `Err` when it makes no sense (counted by the caller).
     ///
     /// # Errors
-    /// An unknown verb, or a place that is none.
-    pub fn obey(&mut self, command: &Command, place: Option<&Place>) -> Result<Option<Event>, Nonsense> {
+    /// An unknown verb, a place that is none, or a command that has expired or was overtaken by a newer one.
+    pub fn obey(
+        &mut self,
+        now: u64,
+        command: &Command,
+        place: Option<&Place>,
+    ) -> Result<Option<Event>, Nonsense> {
         let verb = u8::try_from(command.verb).ok().and_then(Verb::from_code).ok_or(Nonsense)?;
         let there = (command.x_m, command.y_m);
         if verb == Verb::GoTo && !(there.0.abs() < 1e4 && there.1.abs() < 1e4) {
             return Err(Nonsense);
         }
-        if self.command == Some(command.command_sequence) {
+        if self.heard.is_some_and(|heard| heard.sequence == command.command_sequence) {
             return Ok(None);
         }
-        self.command = Some(command.command_sequence);
-        let here = place.map(|place| (place.x, place.y));
-        Ok(match verb {
-            Verb::TakeOff => None,
+        if !command.counts(now, self.heard().stamp_ns) {
+            return Err(Nonsense);
+        }
+        let (answer, event) = self.follow(verb, there, place.map(|place| (place.x, place.y)));
+        self.heard =
+            Some(Heard { sequence: command.command_sequence, stamp_ns: command.header.stamp_ns, answer });
+        Ok(event)
+    }
+
+    fn follow(&mut self, verb: Verb, there: (f32, f32), here: Option<(f32, f32)>) -> (Answer, Option<Event>) {
+        match verb {
+            Verb::TakeOff => (Answer::Accepted, None),
             Verb::Land => {
                 self.stop(PatrolState::Idle, None);
-                Some(Event::Drop)
+                (Answer::Accepted, Some(Event::Drop))
             }
             Verb::Hold | Verb::PatrolPause => {
                 let paused =
@@ -179,21 +202,21 @@ impl Mission {
                 if paused {
                     self.state = PatrolState::Paused;
                     self.hold = here;
-                    Some(Event::Drop)
+                    (Answer::Accepted, Some(Event::Drop))
                 } else if verb == Verb::Hold {
                     self.stop(PatrolState::Idle, here);
-                    Some(Event::Drop)
+                    (Answer::Accepted, Some(Event::Drop))
                 } else {
-                    None
+                    (Answer::Refused, None)
                 }
             }
             Verb::GoTo => {
                 self.head(Goal::There(there), PatrolState::GoingThere, here);
-                Some(Event::Plan)
+                (Answer::Working, Some(Event::Plan))
             }
             Verb::PatrolStart if self.goal == Goal::Round && self.state == PatrolState::Paused => {
                 self.head(Goal::Round, PatrolState::Planning, here);
-                Some(Event::Plan)
+                (Answer::Accepted, Some(Event::Plan))
             }
             Verb::PatrolStart => {
                 if self.phase == Phase::Grounded && self.pad.is_none() {
@@ -201,13 +224,22 @@ impl Mission {
                 }
                 self.flew = self.airborne();
                 self.head(Goal::Round, PatrolState::Planning, if self.flew { here } else { None });
-                Some(Event::NewRound)
+                // A whole round takes many steps to plan: nobody waits for that.
+                (Answer::Accepted, Some(Event::NewRound))
             }
             Verb::PatrolStop | Verb::Home => {
                 self.head(Goal::Home, PatrolState::Returning, here);
-                Some(Event::Plan)
+                (Answer::Working, Some(Event::Plan))
             }
-        })
+        }
+    }
+
+    fn answer(&mut self, answer: Answer) {
+        if let Some(heard) = &mut self.heard
+            && heard.answer == Answer::Working
+        {
+            heard.answer = answer;
+        }
     }
 
     fn head(&mut self, goal: Goal, state: PatrolState, hold: Option<(f32, f32)>) {
@@ -284,6 +316,7 @@ impl Mission {
 
     /// The planner has a route.
     pub fn route_ready(&mut self) {
+        self.answer(Answer::Accepted);
         if self.state == PatrolState::Planning {
             self.state = PatrolState::Flying;
         }
@@ -299,6 +332,7 @@ impl Mission {
 
     /// There is no way on.
     pub fn no_way(&mut self, place: Option<&Place>) {
+        self.answer(Answer::Refused);
         let state = if self.goal == Goal::Round || self.goal == Goal::Home {
             PatrolState::Failed
         } else {

@@ -3,10 +3,11 @@
 use crate::atlas::Atlas;
 use crate::config::NavigationConfig;
 use crate::core::Core;
+use crate::mission::Heard;
 use crate::steer::Craft;
 use ::core::fmt::Write;
 use floorplan::Rooms;
-use ipc_types::{Command, Grid, Patrol, PilotState, Polar, Pose, Setpoint, SonarRanges, Text};
+use ipc_types::{Answer, Command, Grid, Patrol, PilotState, Polar, Pose, Setpoint, SonarRanges, Text};
 use runtime::{ConfigError, Guard, Input, Output, Ports, Service, Start, StartError};
 use std::sync::Arc;
 
@@ -29,7 +30,8 @@ pub struct Navigation {
     known: Option<Guard<Grid>>,
     retained: Option<Box<Patrol>>,
     said_ns: Option<u64>,
-    said_state: u8,
+    /// State, command and answer that were said last: what differs from them is said at once.
+    said: (u8, Heard),
     resumed: bool,
 }
 
@@ -62,11 +64,11 @@ impl Service for Navigation {
         })?;
         Ok(Self {
             core,
-            pose: ports.input(8)?,
-            ranges: ports.input(8)?,
-            pilot: ports.input(4)?,
-            command: ports.input(8)?,
-            last_grid: ports.input(1)?,
+            pose: ports.input()?,
+            ranges: ports.input()?,
+            pilot: ports.input()?,
+            command: ports.input()?,
+            last_grid: ports.input()?,
             grid: ports.output()?,
             polar: ports.output()?,
             setpoint: ports.output()?,
@@ -74,7 +76,7 @@ impl Service for Navigation {
             known: None,
             retained: ports.retained()?,
             said_ns: None,
-            said_state: u8::MAX,
+            said: (u8::MAX, Heard { sequence: 0, stamp_ns: 0, answer: Answer::None }),
             resumed: false,
         })
     }
@@ -84,7 +86,7 @@ impl Service for Navigation {
         if !self.resumed {
             self.resumed = true;
             if let Some(patrol) = self.retained.take() {
-                core.resume(&patrol);
+                core.resume(now, &patrol);
             }
         }
         while let Some(message) = self.pose.receive() {
@@ -97,7 +99,7 @@ impl Service for Navigation {
             core.pilot(&message);
         }
         while let Some(message) = self.command.receive() {
-            core.command(&message);
+            core.command(now, &message);
         }
         if let Some(grid) = self.last_grid.latest() {
             self.known = Some(grid);
@@ -117,15 +119,15 @@ impl Service for Navigation {
         if let Some(polar) = polar {
             polar.send();
         }
-        let state = core.mission().state().code();
+        let news = (core.mission().state().code(), core.mission().heard());
         let due = self.said_ns.is_none_or(|said| now.saturating_sub(said) >= PATROL_NS);
-        if (due || state != self.said_state)
+        if (due || news != self.said)
             && let Some(mut patrol) = self.patrol.loan()
         {
             core.write_patrol(&mut patrol);
             patrol.send();
             self.said_ns = Some(now);
-            self.said_state = state;
+            self.said = news;
         }
         // Last, so that planning never delays a setpoint.
         core.plan_on(now);

@@ -5,7 +5,7 @@ use crate::core::Core;
 use crate::mission::{Goal, Intent};
 use crate::steer::Steer;
 use core::fmt::Write;
-use ipc_types::{PatrolState, Polar, Setpoint, SetpointKind, SteeringReason, Text, nanoseconds};
+use ipc_types::{Answer, PatrolState, Polar, Setpoint, SetpointKind, SteeringReason, Text, nanoseconds};
 
 impl Core {
     /// Says in one sentence what is being done and why.
@@ -35,6 +35,19 @@ impl Core {
             _ => write!(text, "standing: the pilot is flying on its own"),
         };
         self.text = text;
+    }
+
+    /// Answers the last command in one sentence; `why` if it is refused.
+    pub(crate) fn say_answer(&mut self, why: &str) {
+        let mut text = Text::default();
+        // What does not fit is cut at the end, where it matters least.
+        let _ = match self.mission.heard().answer {
+            Answer::None => Ok(()),
+            Answer::Working => write!(text, "working out the route"),
+            Answer::Accepted => write!(text, "{}", self.mission.state()),
+            Answer::Refused => write!(text, "refused: {why}"),
+        };
+        self.answer = text;
     }
 
     fn write_steering(&self, text: &mut Text<128>) -> core::fmt::Result {

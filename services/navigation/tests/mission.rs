@@ -1,8 +1,8 @@
 //! Commands and the pilot's phases.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use ipc_types::{Command, FailsafeAction, PatrolState, Phase, PilotState, Verb};
-use navigation::mission::{Event, Goal, Intent, Mission, Nonsense};
+use ipc_types::{Answer, COMMAND_LIFE_NS, Command, FailsafeAction, PatrolState, Phase, PilotState, Verb};
+use navigation::mission::{Event, Goal, Heard, Intent, Mission, Nonsense};
 use navigation::place::Place;
 
 const PAD: (f32, f32) = (1.0, 1.0);
@@ -27,12 +27,13 @@ impl Story {
         self.number += 1;
         let command = Command {
             verb: u32::from(verb.code()),
+            expiry_ns: COMMAND_LIFE_NS,
             command_sequence: self.number,
             x_m,
             y_m,
             ..Command::default()
         };
-        self.mission.obey(&command, Some(&place(3.0, 3.0)))
+        self.mission.obey(0, &command, Some(&place(3.0, 3.0)))
     }
     fn pilot(&mut self, phase: Phase, action: FailsafeAction) -> Option<Event> {
         let state = PilotState { phase: phase.code(), action: action.code(), ..PilotState::default() };
@@ -122,9 +123,9 @@ fn nonsense_changes_nothing() {
     assert_eq!(story.order_to(Verb::GoTo, f32::NAN, 1.0), Err(Nonsense));
     assert_eq!(story.order_to(Verb::GoTo, 1.0, f32::INFINITY), Err(Nonsense));
     let unknown = Command { verb: 99, command_sequence: 77, ..Command::default() };
-    assert_eq!(story.mission.obey(&unknown, None), Err(Nonsense));
+    assert_eq!(story.mission.obey(0, &unknown, None), Err(Nonsense));
     assert_eq!(story.mission.hear(&PilotState { phase: 200, ..PilotState::default() }, None), Err(Nonsense));
-    assert_eq!((story.mission.state(), story.mission.command()), (PatrolState::Idle, 0));
+    assert_eq!((story.mission.state(), story.mission.heard().sequence), (PatrolState::Idle, 0));
 }
 
 #[test]
@@ -178,10 +179,25 @@ fn a_restart_goes_on_where_it_was_and_obeys_no_command_twice() {
         (PatrolState::Done, Goal::None, PatrolState::Done),
     ] {
         let mut mission = Mission::new(None);
-        mission.restore(state, PAD, Some((4.0, 4.0)), 7);
+        let second = 1_000_000_000;
+        let heard = Heard { sequence: 7, stamp_ns: 10 * second, answer: Answer::Accepted };
+        mission.restore(state, PAD, Some((4.0, 4.0)), heard);
         assert_eq!((mission.state(), mission.goal(), mission.pad()), (after, goal, Some(PAD)));
-        let again =
-            Command { verb: u32::from(Verb::PatrolStart.code()), command_sequence: 7, ..Command::default() };
-        assert_eq!(mission.obey(&again, None), Ok(None));
+        let mut again = Command {
+            expiry_ns: 10 * second + COMMAND_LIFE_NS,
+            verb: u32::from(Verb::PatrolStart.code()),
+            command_sequence: 7,
+            ..Command::default()
+        };
+        again.header.stamp_ns = 10 * second;
+        assert_eq!(mission.obey(10 * second, &again, None), Ok(None));
+        // Somebody else's order, given a moment earlier, is still in his channel's history.
+        again.command_sequence = 6;
+        again.header.stamp_ns -= 1;
+        again.expiry_ns -= 1;
+        assert_eq!(mission.obey(10 * second, &again, None), Err(Nonsense), "overtaken");
+        again.header.stamp_ns += 1;
+        assert_eq!(mission.obey(13 * second, &again, None), Err(Nonsense), "expired");
+        assert_eq!((mission.state(), mission.heard()), (after, heard));
     }
 }

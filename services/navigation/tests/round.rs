@@ -6,8 +6,8 @@ mod common;
 use common::{Drone, STEP_NS, World, world};
 use floorplan::{Door, Rooms, Sidecar};
 use ipc_types::{
-    Command, Grid, LocalizationState, MAX_SONARS, Patrol, PatrolState, Phase, PilotState, Polar, Pose,
-    RoomState, Setpoint, SetpointKind, SonarRanges, Verb,
+    COMMAND_LIFE_NS, Command, Grid, LocalizationState, MAX_SONARS, Patrol, PatrolState, Phase, PilotState,
+    Polar, Pose, RoomState, Setpoint, SetpointKind, SonarRanges, Verb,
 };
 use navigation::atlas::Atlas;
 use navigation::config::NavigationConfig;
@@ -104,14 +104,16 @@ impl Flight {
 
     fn order(&mut self, verb: Verb, x_m: f32, y_m: f32) {
         self.commands += 1;
-        let command = Command {
+        let mut command = Command {
             verb: u32::from(verb.code()),
+            expiry_ns: self.now + COMMAND_LIFE_NS,
             command_sequence: self.commands,
             x_m,
             y_m,
             ..Command::default()
         };
-        self.core.command(&command);
+        command.header.stamp_ns = self.now;
+        self.core.command(self.now, &command);
         if self.phase == Phase::Grounded {
             self.phase = Phase::Autonomous;
         }
@@ -346,7 +348,7 @@ fn a_restart_in_the_middle_goes_on_with_the_round() {
         if (flight.now / STEP_NS).is_multiple_of(300) {
             let retained = flight.report();
             flight.core = Flight::core(&flight.atlas);
-            flight.core.resume(&retained);
+            flight.core.resume(flight.now, &retained);
             flight.grid = None;
             restarts += 1;
             let again = flight.report();
@@ -381,7 +383,7 @@ fn a_retained_message_that_makes_no_sense_is_refused() {
         let mut bad = good.clone();
         spoil(&mut bad);
         let mut core = Flight::core(&flight.atlas);
-        core.resume(&bad);
+        core.resume(0, &bad);
         assert_eq!((core.refused(), core.mission().state()), (1, PatrolState::Idle), "{i}");
     }
 }

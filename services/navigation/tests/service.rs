@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use ipc_types::{
-    Command, Grid, LocalizationState, Patrol, PatrolState, Phase, PilotState, Polar, Pose, Setpoint,
-    SetpointKind, SonarRanges, SonarReading, SonarStatus, Verb,
+    Answer, COMMAND_LIFE_NS, Command, Grid, LocalizationState, Patrol, PatrolState, Phase, PilotState, Polar,
+    Pose, Setpoint, SetpointKind, SonarRanges, SonarReading, SonarStatus, Verb,
 };
 use manifest::Manifest;
 use navigation::Navigation;
@@ -62,10 +62,10 @@ impl Bench {
             ranges: ports.output().unwrap(),
             pilot: ports.output().unwrap(),
             command: ports.output().unwrap(),
-            setpoint: ports.input(16).unwrap(),
-            polar: ports.input(16).unwrap(),
-            grid: ports.input(16).unwrap(),
-            patrol: ports.input(2).unwrap(),
+            setpoint: ports.input().unwrap(),
+            polar: ports.input().unwrap(),
+            grid: ports.input().unwrap(),
+            patrol: ports.input().unwrap(),
             place: PAD,
             heading: 1.57,
             system,
@@ -115,6 +115,7 @@ impl Bench {
 
     fn order(&mut self, verb: Verb, number: u32) {
         self.command.publish(&Command {
+            expiry_ns: self.command.now_ns() + COMMAND_LIFE_NS,
             verb: u32::from(verb.code()),
             command_sequence: number,
             x_m: f32::NAN,
@@ -145,6 +146,8 @@ fn a_round_begins_survives_a_kill_and_goes_on() {
     }
     let before = bench.patrol.latest().unwrap();
     assert_eq!(before.state, u32::from(PatrolState::Flying.code()), "{}", before.text);
+    let accepted = u32::from(Answer::Accepted.code());
+    assert_eq!((before.command_sequence, before.answer), (5, accepted), "{}", before.answer_text);
     assert!(before.rooms_used == 9 && before.waypoints_used > 20, "{}", before.waypoints_used);
     assert!(before.coverage > 0.01 && before.coverage < 0.5, "{}", before.coverage);
     assert!((bench.place.0 - PAD.0).hypot(bench.place.1 - PAD.1) > 1.0);
@@ -182,6 +185,13 @@ fn messages_that_make_no_sense_are_counted_and_change_nothing() {
     bench.step();
     let setpoint = bench.step().unwrap();
     assert_eq!(bench.system.refused("navigation"), 4);
+    // What makes sense and cannot be done is answered at once, with its number.
+    bench.order(Verb::PatrolPause, 12);
+    bench.step();
+    bench.step();
+    let patrol = bench.patrol.latest().unwrap();
+    assert_eq!((patrol.command_sequence, patrol.answer), (12, u32::from(Answer::Refused.code())));
+    assert_eq!(patrol.answer_text.as_str(), "refused: there is no round to pause");
     assert_eq!(setpoint.kind, u32::from(SetpointKind::Hover.code()));
     assert_eq!(bench.system.status("navigation"), "idle: waiting for a command");
 }

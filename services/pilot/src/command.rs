@@ -4,80 +4,156 @@ use crate::core::PilotCore;
 use crate::senses::age_s;
 use control::SpoolUp;
 use core::fmt::Write;
-use ipc_types::{Command, LinkState, Phase, Text, Verb};
+use ipc_types::{Answer, Command, LinkState, Phase, PilotState, Text, Verb};
 
 /// A side sonar that has not answered for so long keeps the drone on the ground, seconds. Two pings lost in a row happen;
 /// in flight they close the sectors for a moment.
 const SIDES_S: f32 = 1.0;
 
+/// Why an order is refused, and what is said of one that is obeyed.
+type Ruling = Result<&'static str, Text<96>>;
+
+fn refused(why: &str) -> Ruling {
+    Err(Text::new(why))
+}
+
+/// The last command that was heard, and what became of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Heard {
+    pub(crate) sequence: u32,
+    pub(crate) stamp_ns: u64,
+    pub(crate) answer: Answer,
+    pub(crate) text: Text<96>,
+}
+
+impl Default for Heard {
+    fn default() -> Self {
+        Self { sequence: 0, stamp_ns: 0, answer: Answer::None, text: Text::default() }
+    }
+}
+
+impl Heard {
+    /// What was heard before a restart.
+    pub(crate) fn before(now: u64, state: &PilotState) -> Self {
+        Self {
+            sequence: state.command_sequence,
+            // A time that has not come yet would shut out every later order.
+            stamp_ns: state.command_ns.min(now),
+            answer: u8::try_from(state.answer).ok().and_then(Answer::from_code).unwrap_or(Answer::None),
+            text: state.answer_text,
+        }
+    }
+}
+
 impl PilotCore {
-    /// Obeys a command, once; says why not when it is refused.
+    /// Obeys a command, once and in time; says why not when it is refused. One that has expired or was overtaken by
+    /// a newer one is counted and not answered: whoever gave it no longer waits.
     pub fn command(&mut self, now: u64, message: &Command) {
         let Some(verb) = u8::try_from(message.verb).ok().and_then(Verb::from_code) else {
             self.refused += 1;
             return;
         };
-        if message.command_sequence == self.command_sequence {
+        if message.command_sequence == self.heard.sequence {
             return;
         }
-        self.command_sequence = message.command_sequence;
+        if !message.counts(now, self.heard.stamp_ns) {
+            self.refused += 1;
+            return;
+        }
+        let (answer, text) = match self.obey(now, verb) {
+            Ok(sentence) => (Answer::Accepted, Text::new(sentence)),
+            Err(sentence) => (Answer::Refused, sentence),
+        };
+        self.heard =
+            Heard { sequence: message.command_sequence, stamp_ns: message.header.stamp_ns, answer, text };
+        // Why the drone comes down matters more than what was asked of it meanwhile.
+        if self.phase != Phase::EmergencyLanding {
+            self.text = text;
+        }
         self.changed = true;
+    }
+
+    fn obey(&mut self, now: u64, verb: Verb) -> Ruling {
         match (verb, self.phase) {
+            (_, Phase::Cut) => refused("refused: the motors were cut"),
             (Verb::TakeOff, Phase::Grounded) => self.try_take_off(now, Phase::Hover),
-            (Verb::TakeOff, _) => self.say("refused: already flying"),
+            (
+                Verb::TakeOff,
+                Phase::Arming
+                | Phase::TakeOff
+                | Phase::Hover
+                | Phase::Autonomous
+                | Phase::Manual
+                | Phase::Landing
+                | Phase::EmergencyLanding,
+            ) => refused("refused: already flying"),
             (Verb::GoTo | Verb::PatrolStart | Verb::Home, Phase::Grounded) => {
-                self.try_take_off(now, Phase::Autonomous);
+                self.try_take_off(now, Phase::Autonomous)
             }
-            (Verb::GoTo | Verb::PatrolStart | Verb::Home, Phase::Arming | Phase::TakeOff) => {
+            (Verb::PatrolPause | Verb::PatrolStop, Phase::Grounded) => refused("refused: not flying"),
+            (
+                Verb::GoTo | Verb::PatrolStart | Verb::Home | Verb::PatrolStop,
+                Phase::Arming | Phase::TakeOff,
+            ) => {
                 self.after_take_off = Phase::Autonomous;
+                Ok("following navigation after the take-off")
+            }
+            // Navigation keeps the round and wishes to stand, or there is no round and the take-off ends in a hover.
+            (Verb::PatrolPause, Phase::Arming | Phase::TakeOff) => Ok("hovering after the take-off"),
+            (
+                Verb::GoTo | Verb::PatrolStart | Verb::PatrolPause | Verb::PatrolStop | Verb::Home,
+                Phase::Hover | Phase::Autonomous,
+            ) => {
+                if self.phase == Phase::Hover {
+                    self.enter(now, Phase::Autonomous);
+                }
+                Ok("following navigation")
             }
             (
                 Verb::GoTo | Verb::PatrolStart | Verb::PatrolPause | Verb::PatrolStop | Verb::Home,
-                Phase::Hover,
+                Phase::Manual,
+            ) => refused("refused: a human holds the sticks"),
+            (
+                Verb::GoTo | Verb::PatrolStart | Verb::PatrolPause | Verb::PatrolStop | Verb::Home,
+                Phase::Landing | Phase::EmergencyLanding,
+            ) => refused("refused: landing"),
+            (Verb::Land | Verb::Hold, Phase::Grounded) => refused("refused: on the ground"),
+            (Verb::Land | Verb::Hold, Phase::Arming) => Ok(self.call_off(now)),
+            (Verb::Land, Phase::TakeOff) if self.spool.is_some() => Ok(self.call_off(now)),
+            (Verb::Land, Phase::EmergencyLanding) => Ok("landing already"),
+            (
+                Verb::Land,
+                Phase::TakeOff | Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing,
             ) => {
-                self.enter(now, Phase::Autonomous);
-                self.say("following navigation");
-            }
-            (Verb::PatrolPause | Verb::PatrolStop, Phase::Grounded) => self.say("refused: not flying"),
-            (Verb::GoTo | Verb::PatrolStart | Verb::Home, Phase::Landing | Phase::EmergencyLanding) => {
-                self.say("refused: landing");
-            }
-            (Verb::Land, Phase::Grounded | Phase::Cut) => self.say("refused: on the ground"),
-            (Verb::Land, Phase::Arming) => self.give_up(now, "take-off called off"),
-            (Verb::Land, Phase::TakeOff) if self.spool.is_some() => self.give_up(now, "take-off called off"),
-            (Verb::Land, Phase::EmergencyLanding) => {}
-            (Verb::Land, _) => {
                 self.operator_land = true;
                 self.land(now, None);
-                self.say("landing: the operator's order");
+                Ok("landing: the operator's order")
             }
-            (Verb::Hold, Phase::Grounded | Phase::Cut) => self.say("refused: on the ground"),
-            (Verb::Hold, Phase::Arming) => self.give_up(now, "take-off called off"),
-            (Verb::Hold, Phase::TakeOff) => self.after_take_off = Phase::Hover,
-            (Verb::Hold, Phase::EmergencyLanding) => self.say("refused: emergency landing"),
-            (Verb::Hold, _) => {
+            (Verb::Hold, Phase::TakeOff) => {
+                self.after_take_off = Phase::Hover;
+                Ok("hovering after the take-off")
+            }
+            (Verb::Hold, Phase::EmergencyLanding) => refused("refused: emergency landing"),
+            (Verb::Hold, Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing) => {
                 self.operator_land = false;
                 self.hold = None;
                 self.hold_heading = None;
                 self.enter(now, Phase::Hover);
-                self.say("holding: the operator's order");
+                Ok("holding: the operator's order")
             }
-            (_, Phase::Cut) => self.say("refused: the motors were cut"),
-            _ => {}
         }
     }
 
     /// Starts to arm, or says in a sentence why not.
-    fn try_take_off(&mut self, now: u64, then: Phase) {
+    fn try_take_off(&mut self, now: u64, then: Phase) -> Ruling {
         let mut sentence = Text::<96>::default();
         if self.why_not(now, &mut sentence) {
-            self.text = sentence;
-            return;
+            return Err(sentence);
         }
         self.after_take_off = then;
         self.operator_land = false;
         self.enter(now, Phase::Arming);
-        self.say("arming");
+        Ok("arming")
     }
 
     /// Writes why a take-off is refused; false when nothing stands in the way.
@@ -118,6 +194,12 @@ impl PilotCore {
         true
     }
 
+    fn call_off(&mut self, now: u64) -> &'static str {
+        let why = "take-off called off";
+        self.give_up(now, why);
+        why
+    }
+
     /// Back to motors off before the skids left the ground.
     pub(crate) fn give_up(&mut self, now: u64, why: &str) {
         self.spool = None;
@@ -141,5 +223,109 @@ impl PilotCore {
         self.seed_level();
         self.enter(now, Phase::TakeOff);
         self.say("taking off");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::PilotConfig;
+    use crate::core::Craft;
+    use ipc_types::COMMAND_LIFE_NS;
+
+    const SECOND: u64 = 1_000_000_000;
+
+    fn core() -> PilotCore {
+        let craft = Craft {
+            radius_m: 0.225,
+            sides: Vec::new(),
+            has_down: true,
+            rest_m: 0.05,
+            beam_rest_m: 0.05,
+            hover_us: 1500.0,
+            cells: 3,
+            capacity_mah: 3700.0,
+            cruise_m_s: 0.5,
+            max_tilt_rad: 0.2,
+        };
+        PilotCore::new(PilotConfig::default(), craft, None)
+    }
+
+    fn order(verb: Verb, sequence: u32, given_ns: u64) -> Command {
+        let mut command = Command {
+            expiry_ns: given_ns + COMMAND_LIFE_NS,
+            verb: verb.code().into(),
+            command_sequence: sequence,
+            ..Command::default()
+        };
+        command.header.stamp_ns = given_ns;
+        command
+    }
+
+    fn state(core: &PilotCore) -> PilotState {
+        let mut state = PilotState::default();
+        core.write_state(&mut state);
+        state
+    }
+
+    #[test]
+    fn every_order_is_answered_in_every_phase() {
+        for &verb in Verb::ALL {
+            for &phase in Phase::ALL {
+                let mut core = core();
+                core.phase = phase;
+                core.say("from before");
+                core.command(SECOND, &order(verb, 7, SECOND));
+                let state = state(&core);
+                let text = state.answer_text;
+                assert_eq!((state.command_sequence, state.command_ns), (7, SECOND), "{verb} in {phase}");
+                let refused = state.answer == u32::from(Answer::Refused.code());
+                assert!(refused || state.answer == u32::from(Answer::Accepted.code()), "{verb} in {phase}");
+                assert_eq!(text.as_str().starts_with("refused: "), refused, "{verb} in {phase}: {text}");
+                assert!(
+                    !text.as_str().is_empty() && text.as_str() != "from before",
+                    "{verb} in {phase}: {text}"
+                );
+            }
+        }
+    }
+
+    /// One operator orders, another orders something else later, and the pilot is restarted: both orders are still in
+    /// the history of their senders' channels.
+    #[test]
+    fn what_was_overtaken_or_has_expired_is_not_obeyed_after_a_restart() {
+        let (first, second) = (order(Verb::Home, 100, 10 * SECOND), order(Verb::Hold, 200, 10 * SECOND + 1));
+        let mut before = core();
+        before.phase = Phase::Hover;
+        before.command(10 * SECOND, &first);
+        assert_eq!(before.phase, Phase::Autonomous);
+        before.command(10 * SECOND + 1, &second);
+        assert_eq!(before.phase, Phase::Hover);
+
+        for history in [[&first, &second], [&second, &first]] {
+            let mut after = core();
+            after.resume(11 * SECOND, &state(&before));
+            after.phase = Phase::Hover;
+            for command in history {
+                after.command(11 * SECOND, command);
+            }
+            assert_eq!((after.phase, after.heard.sequence), (Phase::Hover, 200));
+        }
+        // A pilot without any memory obeys what is fresh, and nothing else.
+        let mut blank = core();
+        blank.phase = Phase::Hover;
+        blank.command(12 * SECOND, &first);
+        assert_eq!((blank.phase, blank.refused), (Phase::Hover, 1));
+        blank.command(12 * SECOND - 1, &first);
+        assert_eq!(blank.phase, Phase::Autonomous);
+    }
+
+    #[test]
+    fn a_time_that_has_not_come_shuts_nobody_out() {
+        let mut core = core();
+        core.resume(SECOND, &PilotState { command_ns: u64::MAX, ..PilotState::default() });
+        core.phase = Phase::Autonomous;
+        core.command(2 * SECOND, &order(Verb::Land, 3, 2 * SECOND));
+        assert_eq!(core.phase, Phase::Landing);
     }
 }

@@ -1,5 +1,6 @@
 //! The pilot without ports.
 
+use crate::command::Heard;
 use crate::config::PilotConfig;
 use crate::ground::Below;
 use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, age_s};
@@ -127,7 +128,7 @@ pub struct PilotCore {
     pub(crate) failsafe_since_ns: u64,
     pub(crate) decided: Decided,
     pub(crate) last_step_ns: Option<u64>,
-    pub(crate) command_sequence: u32,
+    pub(crate) heard: Heard,
     pub(crate) changed: bool,
     pub(crate) text: Text<96>,
 }
@@ -180,7 +181,7 @@ impl PilotCore {
             failsafe_since_ns: 0,
             decided: Decided::NEUTRAL,
             last_step_ns: None,
-            command_sequence: 0,
+            heard: Heard::default(),
             changed: true,
             text: Text::new("on the ground"),
             config,

@@ -135,7 +135,7 @@ impl PilotCore {
     }
 
     fn hear_ground(&mut self, ping_ns: u64, range_m: f32) {
-        let at = ping_ns + (range_m / SOUND_M_S * 1e9) as u64;
+        let at = ping_ns.saturating_add((range_m / SOUND_M_S * 1e9) as u64);
         if let Some(spool) = &mut self.spool {
             spool.hear(at, range_m - self.height.rest_m());
         } else if self.airborne() && self.below.sees(ping_ns) {

@@ -76,7 +76,11 @@ impl PilotCore {
         out.phase_since_ns = self.phase_since_ns;
         out.failsafe_since_ns = self.failsafe_since_ns;
         out.causes = self.judged.causes;
-        out.command_sequence = self.command_sequence;
+        out.command_ns = self.heard.stamp_ns;
+        out.command_sequence = self.heard.sequence;
+        out.answer = u32::from(self.heard.answer.code());
+        out.answer_text = self.heard.text;
+        out.reserved = 0;
         out.phase = self.phase.code();
         out.cause = cause(self.judged.cause).code();
         out.action = action(self.judged.action).code();

@@ -1,5 +1,6 @@
 //! Going on after a restart in the air.
 
+use crate::command::Heard;
 use crate::core::PilotCore;
 use control::{SpoolUp, Tilt, Vector, stick};
 use ipc_types::{Phase, PilotState};
@@ -15,7 +16,7 @@ impl PilotCore {
             self.refused += 1;
             return;
         };
-        self.command_sequence = state.command_sequence;
+        self.heard = Heard::before(now, state);
         if (1120.0..=1800.0).contains(&state.hover_throttle_us) {
             self.climb.set_hover(state.hover_throttle_us);
         }

@@ -1,7 +1,9 @@
 //! The service on the lockstep bus, wired by the manifest that flies.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use ipc_types::{Channels, Command, FlightState, LinkState, Phase, PilotState, Verb};
+use ipc_types::{
+    Answer, COMMAND_LIFE_NS, Channels, Command, FlightState, LinkState, Phase, PilotState, Verb,
+};
 use pilot::Pilot;
 use runtime::{Cache, Lockstep, load_manifest};
 
@@ -18,7 +20,7 @@ fn silent_until_it_knows_whether_motors_run_then_neutral_at_50_hz() {
     let mut system = system();
     let mut flight = system.tool("flight");
     let mut states = flight.output::<FlightState>().unwrap();
-    let mut channels = flight.input::<Channels>(4).unwrap();
+    let mut channels = flight.input::<Channels>().unwrap();
     system.add::<Pilot>().unwrap();
     system.run_until(500 * MS);
     assert!(channels.latest().is_none());
@@ -42,7 +44,7 @@ fn started_again_in_the_air_it_holds_the_drone_within_100_ms() {
     let mut system = system();
     let mut flight = system.tool("flight");
     let mut states = flight.output::<FlightState>().unwrap();
-    let mut channels = flight.input::<Channels>(4).unwrap();
+    let mut channels = flight.input::<Channels>().unwrap();
     system.add::<Pilot>().unwrap();
     system.run_until(300 * MS);
     system.kill("pilot");
@@ -79,11 +81,13 @@ fn started_again_in_the_air_it_holds_the_drone_within_100_ms() {
 fn a_refusal_is_said_at_once_with_the_command_that_it_answers() {
     let mut system = system();
     let mut commands = system.tool("cli").output::<Command>().unwrap();
-    let mut answers = system.tool("navigation").input::<PilotState>(4).unwrap();
+    let mut answers = system.tool("navigation").input::<PilotState>().unwrap();
     system.add::<Pilot>().unwrap();
     system.run_until(300 * MS);
     while answers.receive().is_some() {}
+    let expiry_ns = commands.now_ns() + COMMAND_LIFE_NS;
     commands.publish(&Command {
+        expiry_ns,
         verb: Verb::TakeOff.code().into(),
         command_sequence: 77,
         x_m: f32::NAN,
@@ -93,10 +97,10 @@ fn a_refusal_is_said_at_once_with_the_command_that_it_answers() {
     system.run_until(340 * MS);
     let mut answer = None;
     while let Some(state) = answers.receive() {
-        answer = Some((state.command_sequence, state.text));
+        answer = Some((state.command_sequence, state.answer, state.answer_text));
     }
-    let (sequence, text) = answer.unwrap();
-    assert_eq!(sequence, 77);
+    let (sequence, answer, text) = answer.unwrap();
+    assert_eq!((sequence, answer), (77, u32::from(Answer::Refused.code())));
     assert!(text.as_str().starts_with("refused: the flight service is silent"), "{text}");
     assert_eq!(system.refused("pilot"), 0);
 }

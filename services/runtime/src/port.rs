@@ -9,12 +9,12 @@
 //! - no port allocates after start.
 
 use crate::device::{ByteDevice, Devices};
-use crate::journal::InputStats;
+use crate::journal::{InputStats, OutputStats};
 use crate::lockstep::bus::{Bus, LockstepInput, LockstepOutput};
-use crate::shm::{SharedInput, SharedLoan, SharedNode, SharedOutput, SharedSample};
+use crate::shm::{Refused, SharedInput, SharedLoan, SharedNode, SharedOutput, SharedSample};
 use crate::{StartError, access, fnv};
 use ipc_types::{Header, Message};
-use manifest::Manifest;
+use manifest::{Manifest, Subscription};
 use std::cell::Cell;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
@@ -52,8 +52,13 @@ pub(crate) struct StepContext {
 
 impl StepContext {
     pub(crate) fn new(service: &str, incarnation: u32) -> Rc<Self> {
+        Rc::new(Self { now: Cell::new(0), publisher: Self::publisher_of(service), incarnation })
+    }
+
+    /// What stands for a publisher's name in the header of its messages.
+    pub(crate) fn publisher_of(service: &str) -> u32 {
         let hash = fnv(service.as_bytes());
-        Rc::new(Self { now: Cell::new(0), publisher: (hash ^ (hash >> 32)) as u32, incarnation })
+        (hash ^ (hash >> 32)) as u32
     }
 }
 
@@ -72,7 +77,13 @@ impl<T: Message> Input<T> {
     /// The oldest message not yet taken.
     pub fn receive(&mut self) -> Option<Guard<T>> {
         let guard = match &mut self.kind {
-            InputKind::Shared(input) => input.receive().map(|sample| Guard(GuardKind::Shared(sample))),
+            InputKind::Shared(input) => match input.receive() {
+                Ok(sample) => sample.map(|sample| Guard(GuardKind::Shared(sample))),
+                Err(Refused) => {
+                    self.stats.failed();
+                    None
+                }
+            },
             InputKind::Lockstep(input) => input.receive().map(|slot| Guard(GuardKind::Lockstep(slot))),
         }?;
         self.stats.taken(guard.header());
@@ -123,7 +134,7 @@ pub struct Output<T: Message> {
     kind: OutputKind<T>,
     context: Rc<StepContext>,
     sequence: Rc<Cell<u64>>,
-    refused: u64,
+    stats: Rc<OutputStats>,
 }
 
 impl<T: Message> Output<T> {
@@ -137,9 +148,14 @@ impl<T: Message> Output<T> {
             }
         };
         if kind.is_none() {
-            self.refused += 1;
+            self.stats.refused();
         }
-        Some(Loan { kind: kind?, context: Rc::clone(&self.context), sequence: Rc::clone(&self.sequence) })
+        Some(Loan {
+            kind: kind?,
+            context: Rc::clone(&self.context),
+            sequence: Rc::clone(&self.sequence),
+            stats: Rc::clone(&self.stats),
+        })
     }
 
     /// Sends a copy: for small messages that are assembled elsewhere. False when no place was free.
@@ -154,10 +170,16 @@ impl<T: Message> Output<T> {
         }
     }
 
+    /// What a message sent now is stamped with: `now` of the step, for expiries that are counted from it.
+    #[must_use]
+    pub fn now_ns(&self) -> u64 {
+        self.context.now.get()
+    }
+
     /// How often no place was free.
     #[must_use]
     pub fn refused(&self) -> u64 {
-        self.refused
+        self.stats.refusals()
     }
 }
 
@@ -171,6 +193,7 @@ pub struct Loan<T: Message> {
     kind: LoanKind<T>,
     context: Rc<StepContext>,
     sequence: Rc<Cell<u64>>,
+    stats: Rc<OutputStats>,
 }
 
 impl<T: Message> Loan<T> {
@@ -184,10 +207,15 @@ impl<T: Message> Loan<T> {
             publisher: self.context.publisher,
             incarnation: self.context.incarnation,
         };
-        match self.kind {
-            LoanKind::Shared(output, loan) => output.send(loan),
-            LoanKind::Lockstep(output, slot) => output.send(slot, self.context.now.get()),
-        }
+        let now = self.context.now.get();
+        let whole = match self.kind {
+            LoanKind::Shared(output, loan) => output.send(loan).is_ok(),
+            LoanKind::Lockstep(output, slot) => {
+                output.send(slot, now);
+                true
+            }
+        };
+        self.stats.sent(now, whole);
     }
 }
 
@@ -223,9 +251,14 @@ pub struct Ports {
     pub(crate) manifest: Rc<Manifest>,
     pub(crate) context: Rc<StepContext>,
     pub(crate) inputs: Vec<Rc<InputStats>>,
+    pub(crate) outputs: Vec<Rc<OutputStats>>,
+    /// Topics that were opened, to read or to publish.
+    pub(crate) opened: Vec<String>,
     pub(crate) devices: Box<dyn Devices>,
     /// Topics for which the keeper holds something for this start of the service.
     pub(crate) retained: Vec<String>,
+    /// Topics of `retained` that the keeper did not hand over in time.
+    pub(crate) forgotten: Vec<&'static str>,
 }
 
 impl Ports {
@@ -233,27 +266,36 @@ impl Ports {
         StartError::Port { service: self.service.clone(), action, topic: topic.to_owned() }
     }
 
-    /// An input of the topic of `T`, `depth` messages deep (at least 1, at most [`Limits::of`]).
+    /// An input of the topic of `T`, as deep as the manifest says.
     ///
     /// # Errors
-    /// When the manifest does not list the topic for this service, or shared memory refuses.
-    pub fn input<T: Message>(&mut self, depth: usize) -> Result<Input<T>, StartError> {
-        self.input_of(T::TOPIC, depth)
+    /// When the manifest does not list the topic for this service or wants it deeper than [`Limits::of`], or shared
+    /// memory refuses.
+    pub fn input<T: Message>(&mut self) -> Result<Input<T>, StartError> {
+        self.input_of(T::TOPIC)
     }
 
     /// An input of one topic of a family, such as `health/sonar`.
     ///
     /// # Errors
     /// As [`Ports::input`].
-    pub fn input_of<T: Message>(&mut self, topic: &str, depth: usize) -> Result<Input<T>, StartError> {
-        let Some(wake) = access::subscription(&self.manifest, &self.service, topic) else {
+    pub fn input_of<T: Message>(&mut self, topic: &str) -> Result<Input<T>, StartError> {
+        let most = Limits::of::<T>().depth;
+        let subscription = access::subscription(&self.manifest, &self.service, topic, most);
+        let Some(Subscription { depth, wake }) = subscription else {
             return Err(self.refuse("subscribe", topic));
         };
-        let depth = depth.clamp(1, Limits::of::<T>().depth);
+        if !(1..=most).contains(&depth) {
+            return Err(StartError::Manifest(format!(
+                "{}: service.{}.subscribes.\"{topic}\".depth = {depth}: allowed is 1 to {most} for messages of this size",
+                self.manifest.file, self.service
+            )));
+        }
         let kind = match &self.bus {
             BusKind::Shared(node) => InputKind::Shared(node.input(topic, depth)?),
             BusKind::Lockstep(bus) => InputKind::Lockstep(bus.input(topic, depth, &self.service, wake)),
         };
+        self.opened.push(topic.to_owned());
         let stats = Rc::new(InputStats::default());
         self.inputs.push(Rc::clone(&stats));
         Ok(Input { kind, stats })
@@ -279,7 +321,29 @@ impl Ports {
             BusKind::Shared(node) => OutputKind::Shared(node.output(topic, &self.manifest)?),
             BusKind::Lockstep(bus) => OutputKind::Lockstep(bus.output(topic)),
         };
-        Ok(Output { kind, context: Rc::clone(&self.context), sequence: Rc::new(Cell::new(0)), refused: 0 })
+        let stats =
+            Rc::new(OutputStats::with_deadline(access::deadline_ns(&self.manifest, &self.service, topic)));
+        self.opened.push(topic.to_owned());
+        self.outputs.push(Rc::clone(&stats));
+        Ok(Output { kind, context: Rc::clone(&self.context), sequence: Rc::new(Cell::new(0)), stats })
+    }
+
+    /// Checks that the service has opened every topic that the manifest lists for it: the picture of the wiring is
+    /// only worth something if it shows what is, no more and no less. Devices are left out, as a vehicle may lack one.
+    ///
+    /// # Errors
+    /// Names the first that was not opened.
+    pub(crate) fn check_all_opened(&self) -> Result<(), StartError> {
+        let Some(entry) = self.manifest.services.get(&self.service) else { return Ok(()) };
+        let read = entry.subscribes.keys().map(|topic| ("subscribes", topic));
+        let published = entry.publishes.keys().map(|topic| ("publishes", topic));
+        match read.chain(published).find(|(_, topic)| !self.opened.contains(topic)) {
+            None => Ok(()),
+            Some((how, topic)) => Err(StartError::Manifest(format!(
+                "{}: service.{}.{how}.\"{topic}\": the service does not open it; the manifest must not list it",
+                self.manifest.file, self.service
+            ))),
+        }
     }
 
     /// Whether the manifest gives this service the device.
@@ -314,9 +378,13 @@ impl Ports {
         if !self.retained.iter().any(|topic| topic == T::TOPIC) {
             return Ok(None);
         }
-        match &self.bus {
-            BusKind::Shared(node) => node.retained(),
-            BusKind::Lockstep(bus) => Ok(bus.retained()),
+        let kept = match &self.bus {
+            BusKind::Shared(node) => node.retained()?,
+            BusKind::Lockstep(bus) => bus.retained(),
+        };
+        if kept.is_none() {
+            self.forgotten.push(T::TOPIC);
         }
+        Ok(kept)
     }
 }

@@ -8,6 +8,7 @@ use crate::shm::{RunDir, SharedNode, woken_within};
 use crate::{Cache, Input, Output, Ports, Service, Start, StartError, fnv};
 use ipc_types::{Health, MAX_PORTS, Message, Text, Trace};
 use manifest::Manifest;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
@@ -161,14 +162,21 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
         manifest: Rc::new(manifest),
         context: Rc::clone(&context),
         inputs: Vec::new(),
+        outputs: Vec::new(),
+        opened: Vec::new(),
+        forgotten: Vec::new(),
         devices,
         retained: variable(env::RETAINED).unwrap_or_default().split(',').map(str::to_owned).collect(),
     };
     let mut journal = Journal::open(&mut ports, S::NAME)?;
     let mut service = S::start(config, &mut ports, &start)?;
+    ports.check_all_opened()?;
     journal.begin(&start, config_hash, &context);
     notifier.say("READY=1");
     tracing::info!("{} ready (start {incarnation})", S::NAME);
+    for topic in &ports.forgotten {
+        tracing::warn!("{}: the keeper did not answer: started without its memory of {topic}", S::NAME);
+    }
 
     let mut next_tick = monotonic_ns();
     let mut next_heartbeat = next_tick;
@@ -193,9 +201,13 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
         if now >= next_heartbeat {
             next_heartbeat = now + heartbeat.as_nanos() as u64;
             let mut text = Text::<96>::default();
+            if !ports.forgotten.is_empty() {
+                // What does not fit behind it is cut.
+                let _ = text.write_str("WITHOUT ITS MEMORY: ");
+            }
             service.status(&mut text);
-            notifier.beat(&text);
-            journal.report(&text, service.refused(), &ports);
+            let missed = journal.report(now, &text, service.refused(), &ports);
+            notifier.beat(&text, missed);
             node.serve_late_joiners();
         }
     }
@@ -271,11 +283,19 @@ impl Journal {
         loan.send();
     }
 
-    fn report(&mut self, text: &Text<96>, refused: u64, ports: &Ports) {
+    /// Answers how many deadlines were missed.
+    fn report(&mut self, now: u64, text: &Text<96>, refused: u64, ports: &Ports) -> u64 {
+        for output in &ports.outputs {
+            output.watch(now);
+        }
+        let missed = ports.outputs.iter().map(|output| output.missed()).sum();
         let health = Health {
             steps: self.step,
             lost: ports.inputs.iter().map(|input| input.lost()).sum(),
             refused,
+            unheard: ports.inputs.iter().map(|input| input.failures()).sum(),
+            unsent: ports.outputs.iter().map(|output| output.unsent()).sum(),
+            missed,
             longest_step_ns: self.longest,
             mean_step_ns: self.total / self.counted.max(1),
             lateness_ns: self.lateness,
@@ -285,6 +305,7 @@ impl Journal {
         };
         self.health.publish(&health);
         (self.longest, self.total, self.counted, self.lateness) = (0, 0, 0, 0);
+        missed
     }
 }
 
@@ -310,10 +331,28 @@ impl Tool {
             manifest: Rc::new(manifest),
             context,
             inputs: Vec::new(),
+            outputs: Vec::new(),
+            opened: Vec::new(),
+            forgotten: Vec::new(),
             devices: Box::new(crate::NoDevices),
             retained: Vec::new(),
         };
         Ok(Self { ports, node })
+    }
+
+    /// Joins a running system as a service that is started again, which the keeper offers `topics`.
+    ///
+    /// # Errors
+    /// As [`Tool::join`].
+    pub fn restarted(
+        name: &str,
+        manifest: Manifest,
+        run_dir: &RunDir,
+        topics: Vec<String>,
+    ) -> Result<Self, StartError> {
+        let mut tool = Self::join(name, manifest, run_dir)?;
+        tool.ports.retained = topics;
+        Ok(tool)
     }
 
     /// Sets the time that messages sent from now on are stamped with.

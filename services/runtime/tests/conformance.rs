@@ -1,10 +1,11 @@
 //! One suite, two buses: the rules of `Input` and `Output` hold on shared memory and in lockstep alike.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use ipc_types::{Particles, PilotState, Pose, Setpoint};
+use ipc_types::{Command, Particles, PilotState, Pose, Setpoint};
 use manifest::Manifest;
 use runtime::shm::{Holder, RunDir};
 use runtime::{Cache, Lockstep, Ports, Tool};
+use std::io::{BufRead, Write};
 
 const MANIFEST: &str = r#"
 [system]
@@ -25,22 +26,46 @@ criticality = "mission"
 tick_hz = 10
 subscribes.'localization/pose' = { depth = 16, wake = true }
 subscribes.'localization/particles' = { depth = 2 }
+subscribes.'operator/command' = { depth = 8 }
+[service.shallow]
+run = "shallow"
+criticality = "mission"
+tick_hz = 10
+subscribes.'localization/pose' = { depth = 2 }
+subscribes.'localization/particles' = { depth = 3 }
+[service.single]
+run = "single"
+criticality = "mission"
+tick_hz = 10
+subscribes.'localization/pose' = { depth = 1 }
+[tool.operator]
+publishes = ["operator/command"]
+[tool."other-operator"]
+publishes = ["operator/command"]
+[tool."late-operator"]
+publishes = ["operator/command"]
 "#;
 
 fn manifest() -> Manifest {
     Manifest::parse("conformance.toml", MANIFEST).unwrap()
 }
 
-/// A bus as the suite sees it: ports for either service, and a way to let messages arrive.
+/// A bus as the suite sees it: ports for any service, a way to let messages arrive, and death.
 trait Bus {
-    fn ports(&mut self, service: &str) -> Ports;
+    fn ports(&mut self, service: &str) -> &mut Ports;
     fn settle(&mut self);
+    /// The service is gone, its ports with it.
+    fn die(&mut self, service: &str);
 }
 
-struct Simulated(Lockstep);
+struct Simulated(Lockstep, Vec<Ports>);
 impl Bus for Simulated {
-    fn ports(&mut self, service: &str) -> Ports {
-        self.0.tool(service)
+    fn ports(&mut self, service: &str) -> &mut Ports {
+        self.1.push(self.0.tool(service));
+        self.1.last_mut().unwrap()
+    }
+    fn die(&mut self, service: &str) {
+        self.0.kill(service);
     }
     fn settle(&mut self) {
         // Longer than the longest delay of the lockstep bus.
@@ -50,7 +75,7 @@ impl Bus for Simulated {
 }
 
 struct Shared {
-    tools: Vec<Tool>,
+    tools: Vec<(String, Tool)>,
     holder: Option<Holder>,
     run_dir: RunDir,
     _directory: tempfile::TempDir,
@@ -65,18 +90,20 @@ impl Shared {
     }
 }
 impl Bus for Shared {
-    fn ports(&mut self, service: &str) -> Ports {
-        Tool::join(service, manifest(), &self.run_dir)
-            .map(|tool| {
-                let Tool { ports, .. } = tool;
-                ports
-            })
-            .unwrap()
+    fn ports(&mut self, service: &str) -> &mut Ports {
+        let tool = Tool::join(service, manifest(), &self.run_dir).unwrap();
+        self.tools.push((service.to_owned(), tool));
+        &mut self.tools.last_mut().unwrap().1.ports
     }
     fn settle(&mut self) {
-        for tool in &self.tools {
+        for (_, tool) in &self.tools {
             tool.tick();
         }
+    }
+    fn die(&mut self, service: &str) {
+        self.tools.retain(|(name, _)| name != service);
+        let Some(holder) = &self.holder else { unreachable!() };
+        holder.cleanup_dead_nodes();
     }
 }
 impl Drop for Shared {
@@ -88,7 +115,8 @@ impl Drop for Shared {
 }
 
 fn on_both(test: impl Fn(&mut dyn Bus)) {
-    test(&mut Simulated(Lockstep::new(manifest(), std::path::Path::new("."), 7, Cache::default())));
+    let lockstep = Lockstep::new(manifest(), std::path::Path::new("."), 7, Cache::default());
+    test(&mut Simulated(lockstep, Vec::new()));
     test(&mut Shared::new());
 }
 
@@ -100,7 +128,7 @@ fn pose(x_m: f32) -> Pose {
 fn a_message_arrives_with_its_header() {
     on_both(|bus| {
         let mut output = bus.ports("writer").output::<Pose>().unwrap();
-        let mut input = bus.ports("reader").input::<Pose>(4).unwrap();
+        let mut input = bus.ports("reader").input::<Pose>().unwrap();
         assert!(output.publish(&pose(1.0)));
         assert!(output.publish(&pose(2.0)));
         bus.settle();
@@ -118,7 +146,7 @@ fn a_message_arrives_with_its_header() {
 fn the_oldest_is_dropped_and_counted() {
     on_both(|bus| {
         let mut output = bus.ports("writer").output::<Pose>().unwrap();
-        let mut input = bus.ports("reader").input::<Pose>(2).unwrap();
+        let mut input = bus.ports("shallow").input::<Pose>().unwrap();
         assert!(output.publish(&pose(0.0)));
         bus.settle();
         assert!(input.receive().is_some());
@@ -139,13 +167,43 @@ fn a_late_joiner_gets_the_newest_and_nothing_older() {
         let mut output = bus.ports("writer").output::<Pose>().unwrap();
         assert!(output.publish(&pose(1.0)));
         assert!(output.publish(&pose(2.0)));
-        let mut input = bus.ports("reader").input::<Pose>(4).unwrap();
-        // The next send tells the publisher of its new reader (between sends the runtime does).
-        assert!(output.publish(&pose(3.0)));
+        let mut input = bus.ports("reader").input::<Pose>().unwrap();
+        // Between sends it is the runtime's heartbeat that serves those who joined.
         bus.settle();
         assert_eq!(input.receive().unwrap().x_m, 2.0);
-        assert_eq!(input.receive().unwrap().x_m, 3.0);
         assert!(input.receive().is_none());
+        assert!(output.publish(&pose(3.0)));
+        let mut later = bus.ports("reader").input::<Pose>().unwrap();
+        bus.settle();
+        assert_eq!(input.receive().unwrap().x_m, 3.0);
+        assert_eq!(later.receive().unwrap().x_m, 3.0);
+        assert!(input.receive().is_none() && later.receive().is_none());
+    });
+}
+
+#[test]
+fn a_late_joiner_gets_nothing_of_the_dead_and_the_newest_of_each_who_lives() {
+    on_both(|bus| {
+        let order = |verb: u32| Command { verb, ..Command::default() };
+        let mut poses = bus.ports("writer").output::<Pose>().unwrap();
+        let mut dead = bus.ports("late-operator").output::<Command>().unwrap();
+        let mut first = bus.ports("operator").output::<Command>().unwrap();
+        let mut second = bus.ports("other-operator").output::<Command>().unwrap();
+        assert!(poses.publish(&pose(1.0)));
+        assert!(dead.publish(&order(9)));
+        assert!(first.publish(&order(1)));
+        assert!(first.publish(&order(2)));
+        assert!(second.publish(&order(3)));
+        drop((poses, dead));
+        bus.die("writer");
+        bus.die("late-operator");
+        let mut input = bus.ports("reader").input::<Pose>().unwrap();
+        let mut orders = bus.ports("reader").input::<Command>().unwrap();
+        bus.settle();
+        assert!(input.receive().is_none());
+        let mut heard: Vec<_> = std::iter::from_fn(|| orders.receive().map(|order| order.verb)).collect();
+        heard.sort_unstable();
+        assert_eq!(heard, [2, 3]);
     });
 }
 
@@ -153,7 +211,7 @@ fn a_late_joiner_gets_the_newest_and_nothing_older() {
 fn a_dropped_loan_is_never_seen_and_costs_no_sequence_number() {
     on_both(|bus| {
         let mut output = bus.ports("writer").output::<Pose>().unwrap();
-        let mut input = bus.ports("reader").input::<Pose>(4).unwrap();
+        let mut input = bus.ports("reader").input::<Pose>().unwrap();
         for _ in 0..40 {
             let mut loan = output.loan().unwrap();
             loan.x_m = 9.0;
@@ -170,7 +228,7 @@ fn a_dropped_loan_is_never_seen_and_costs_no_sequence_number() {
 fn a_held_message_stays_as_it_is() {
     on_both(|bus| {
         let mut output = bus.ports("writer").output::<Pose>().unwrap();
-        let mut input = bus.ports("reader").input::<Pose>(1).unwrap();
+        let mut input = bus.ports("single").input::<Pose>().unwrap();
         assert!(output.publish(&pose(1.0)));
         bus.settle();
         let held = input.receive().unwrap();
@@ -186,12 +244,18 @@ fn a_held_message_stays_as_it_is() {
 #[test]
 fn a_port_that_the_manifest_does_not_list_is_refused_by_name() {
     on_both(|bus| {
-        let mut ports = bus.ports("reader");
+        let ports = bus.ports("reader");
         let text = ports.output::<Pose>().map(|_| ()).unwrap_err().to_string();
         assert!(text.contains("reader") && text.contains("publish localization/pose"), "{text}");
-        let text = ports.input::<Setpoint>(1).map(|_| ()).unwrap_err().to_string();
+        let text = ports.input::<Setpoint>().map(|_| ()).unwrap_err().to_string();
         assert!(text.contains("subscribe navigation/setpoint"), "{text}");
         assert!(ports.device("controller").is_err());
+        let shallow = bus.ports("shallow");
+        let text = shallow.input::<Particles>().map(|_| ()).unwrap_err().to_string();
+        let wanted = "conformance.toml: service.shallow.subscribes.\"localization/particles\".depth = 3: allowed is 1 to 2 \
+                      for messages of this size";
+        assert_eq!(text, wanted);
+        let ports = bus.ports("reader");
         assert!(ports.output_of::<ipc_types::Health>("health/reader").is_ok());
         assert!(ports.output_of::<ipc_types::Health>("health/writer").is_err());
     });
@@ -223,36 +287,81 @@ impl ipc_types::Message for OldPose {
 #[test]
 fn a_stale_binary_fails_at_open_with_one_clear_sentence() {
     let mut bus = Shared::new();
-    let text = bus.ports("reader").input::<OldPose>(1).map(|_| ()).unwrap_err().to_string();
+    let text = bus.ports("reader").input::<OldPose>().map(|_| ()).unwrap_err().to_string();
     assert!(text.contains("localization/pose") && text.contains("another layout"), "{text}");
-    assert!(bus.ports("reader").input::<Pose>(1).is_ok());
+    assert!(bus.ports("reader").input::<Pose>().is_ok());
+}
+
+/// Run directory of the process that [`the_publisher_that_is_killed`] plays.
+const VICTIM: &str = "SERENO_TEST_VICTIM";
+
+/// Started by the next test as a process of its own: publishes, says so and waits for its end.
+#[test]
+fn the_publisher_that_is_killed() {
+    let Some(run_dir) = std::env::var_os(VICTIM) else { return };
+    let mut tool = Tool::join("writer", manifest(), &RunDir::new(run_dir)).unwrap();
+    let mut state = tool.ports.output::<PilotState>().unwrap();
+    let mut particles = tool.ports.output::<Particles>().unwrap();
+    for count in 1..=3_u16 {
+        assert!(state.publish(&PilotState { height_m: f32::from(count), ..Default::default() }));
+        let mut loan = particles.loan().unwrap();
+        loan.count = count.into();
+        for (place, x) in loan.x_m.iter_mut().enumerate() {
+            *x = f32::from(count) + place as f32;
+        }
+        loan.send();
+    }
+    // It dies with a message half written.
+    let _half = particles.loan().unwrap();
+    // The byte tells whoever reads that all is sent; what the test harness prints has none of it.
+    std::io::stderr().write_all(b"\0").unwrap();
+    loop {
+        std::thread::park();
+    }
 }
 
 #[test]
-fn what_is_retained_outlives_its_publisher() {
+fn what_is_retained_outlives_its_killed_publisher_whole() {
     let mut bus = Shared::new();
-    {
-        let mut ports = bus.ports("writer");
-        let mut state = ports.output::<PilotState>().unwrap();
-        let mut particles = ports.output::<Particles>().unwrap();
-        for count in 1..=3 {
-            assert!(state.publish(&PilotState { height_m: count as f32, ..Default::default() }));
-            let mut loan = particles.loan().unwrap();
-            loan.count = count;
-            loan.x_m[49_999] = count as f32;
-            loan.send();
-            if let Some(holder) = &mut bus.holder {
-                holder.keep();
-            }
-        }
-    }
     let Some(holder) = &mut bus.holder else { unreachable!() };
+    let mut process = std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "the_publisher_that_is_killed", "--nocapture"])
+        .env(VICTIM, bus.run_dir.path())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = Vec::new();
+    let mut reader = std::io::BufReader::new(process.stderr.take().unwrap());
+    reader.read_until(0, &mut said).unwrap();
+    assert_eq!(said.last(), Some(&0), "{}", String::from_utf8_lossy(&said));
+    process.kill().unwrap();
+    process.wait().unwrap();
+
+    // As the supervisor does; the keeper has seen nothing before the death.
+    holder.keep();
     let mut topics = holder.restore("writer");
     holder.cleanup_dead_nodes();
     topics.sort();
     assert_eq!(topics, ["localization/particles", "pilot/state"]);
     assert_eq!(holder.pilot_state().unwrap().height_m, 3.0);
     assert!(holder.restore("reader").is_empty());
+
+    // The next process reads it back while the keeper goes on with its turns, as its start does.
+    let run_dir = bus.run_dir.clone();
+    let next = std::thread::spawn(move || {
+        let mut tool = Tool::restarted("writer", manifest(), &run_dir, topics).unwrap();
+        let particles = tool.ports.retained::<Particles>().unwrap().unwrap();
+        let state = tool.ports.retained::<PilotState>().unwrap().unwrap();
+        (particles, state.height_m)
+    });
+    while !next.is_finished() {
+        holder.keep();
+        std::thread::yield_now();
+    }
+    let (particles, height_m) = next.join().unwrap();
+    assert_eq!((particles.count, height_m), (3, 3.0));
+    assert!(particles.x_m.iter().enumerate().all(|(place, x)| *x == 3.0 + place as f32));
 }
 
 #[test]
@@ -262,7 +371,7 @@ fn nothing_stays_in_shared_memory() {
         let mut bus = Shared::new();
         run_dir = bus.run_dir.clone();
         let mut output = bus.ports("writer").output::<Pose>().unwrap();
-        let mut input = bus.ports("reader").input::<Pose>(4).unwrap();
+        let mut input = bus.ports("reader").input::<Pose>().unwrap();
         assert!(output.publish(&pose(1.0)));
         assert!(input.receive().is_some());
         assert!(!run_dir.leftovers().is_empty());
@@ -275,7 +384,7 @@ fn the_lockstep_clock_orders_and_repeats() {
     let arrivals = |seed: u64| {
         let mut bus = Lockstep::new(manifest(), std::path::Path::new("."), seed, Cache::default());
         let mut output = bus.tool("writer").output::<Pose>().unwrap();
-        let mut input = bus.tool("reader").input::<Pose>(16).unwrap();
+        let mut input = bus.tool("reader").input::<Pose>().unwrap();
         let mut seen = Vec::new();
         for step in 0..2000_u64 {
             bus.run_until(step * 100_000);

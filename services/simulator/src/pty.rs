@@ -7,10 +7,14 @@ use rustix::io::Errno;
 use rustix::pty::OpenptFlags;
 use rustix::termios::{OptionalActions, QueueSelector};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Bytes that may wait unread at the far end. A port that nobody has open keeps nothing; without this, a
 /// restarted reader would take seconds-old frames for fresh ones.
 const UNREAD: u64 = 1024;
+/// A far end that has said nothing for so long may have been killed. `flight` says something every 20 ms (50 Hz of
+/// channels) and tries a busy port again after as long.
+const SILENCE: Duration = Duration::from_millis(50);
 
 /// Opens pseudo-terminals where the manifest wants devices.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +43,19 @@ struct Pair {
     /// Held, or reading the near end fails as soon as nobody else has the far end open (FACTS 6).
     far: OwnedFd,
     far_path: PathBuf,
+    /// When the far end last said something, or last had its claim lifted.
+    heard: Instant,
+}
+
+impl Pair {
+    /// Lifts the exclusive claim on the far end. It goes with the last close, which never comes while this process
+    /// holds the far end too: without this, a killed reader's successor would find the port busy for ever (root
+    /// alone may open it all the same).
+    fn lift_claim(&mut self, now: Instant) {
+        self.heard = now;
+        // It fails only where there is no claim to lift.
+        let _ = rustix::termios::ioctl_tiocnxcl(&self.far);
+    }
 }
 
 fn failed(what: &str, path: &Path) -> impl FnOnce(Errno) -> DeviceError {
@@ -63,7 +80,7 @@ impl PtyDevice {
         let mut line = rustix::termios::tcgetattr(&far).map_err(failed("look at", &far_path))?;
         line.make_raw();
         rustix::termios::tcsetattr(&far, OptionalActions::Now, &line).map_err(failed("set up", &far_path))?;
-        Ok(Pair { near, far, far_path })
+        Ok(Pair { near, far, far_path, heard: Instant::now() })
     }
 
     /// Puts the link where the manifest says; only ever over another link.
@@ -102,12 +119,21 @@ impl ByteDevice for PtyDevice {
     }
 
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize, DeviceError> {
-        let Some(pair) = &self.open else {
+        let Some(pair) = &mut self.open else {
             return Err(DeviceError(format!("{} is closed", self.path.display())));
         };
         match rustix::io::read(&pair.near, buffer) {
-            Ok(count) => Ok(count),
-            Err(Errno::AGAIN | Errno::INTR) => Ok(0),
+            Ok(count) => {
+                pair.heard = Instant::now();
+                Ok(count)
+            }
+            Err(Errno::AGAIN | Errno::INTR) => {
+                let now = Instant::now();
+                if now.duration_since(pair.heard) >= SILENCE {
+                    pair.lift_claim(now);
+                }
+                Ok(0)
+            }
             Err(error) => {
                 let error = failed("read", &self.path)(error);
                 self.close();
@@ -122,8 +148,6 @@ impl ByteDevice for PtyDevice {
         };
         if rustix::io::ioctl_fionread(&pair.far).is_ok_and(|unread| unread > UNREAD) {
             let _ = rustix::termios::tcflush(&pair.far, QueueSelector::IFlush);
-            // A reader that was killed leaves its exclusive claim behind as long as this end is held.
-            let _ = rustix::termios::ioctl_tiocnxcl(&pair.far);
         }
         match rustix::io::write(&pair.near, bytes) {
             Ok(count) => Ok(count),
@@ -202,6 +226,48 @@ mod tests {
         let mut kept = Vec::new();
         let _ = far_end(&path).read_to_end(&mut kept);
         assert!(kept.len() < 4000, "{} of 9600", kept.len());
+    }
+
+    /// Somebody who is not root, for whom alone an exclusive claim counts.
+    const NOBODY: u32 = 65_534;
+
+    /// Whether a process without privileges can open the far end; `None` where none can be started.
+    fn opens_for_others(path: &Path) -> Option<bool> {
+        use std::os::unix::process::CommandExt;
+        let mut shell = std::process::Command::new("/bin/sh");
+        shell.args(["-c", ": <>\"$0\""]).arg(path).stdin(std::process::Stdio::null());
+        if rustix::process::geteuid().is_root() {
+            std::os::unix::fs::chown(std::fs::canonicalize(path).unwrap(), Some(NOBODY), None).unwrap();
+            shell.uid(NOBODY);
+        }
+        let output = shell.output().ok()?;
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() || said.contains("busy"), "{said}");
+        Some(output.status.success())
+    }
+
+    #[test]
+    fn the_claim_of_a_killed_reader_is_lifted_and_that_of_a_talking_one_is_not() {
+        let path = place("claim");
+        let mut device = PtyDevices.device("controller", path.to_str().unwrap()).unwrap();
+        let mut far = far_end(&path);
+        rustix::termios::ioctl_tiocexcl(&far).unwrap();
+        let mut buffer = [0; 64];
+        for _ in 0..12 {
+            far.write_all(b"x").unwrap();
+            std::thread::sleep(SILENCE / 5);
+            device.read(&mut buffer).unwrap();
+        }
+        match opens_for_others(&path) {
+            None => return println!("skipped: this process may not start one under another user"),
+            Some(opens) => assert!(!opens, "the claim of a reader that talks holds"),
+        }
+        // A kill closes its end, but the claim stays; nothing waits unread on a line of questions and answers.
+        drop(far);
+        assert_eq!(opens_for_others(&path), Some(false), "the claim outlives its owner");
+        std::thread::sleep(SILENCE);
+        assert_eq!(device.read(&mut buffer).unwrap(), 0);
+        assert_eq!(opens_for_others(&path), Some(true));
     }
 
     #[test]

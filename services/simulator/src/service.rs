@@ -56,7 +56,7 @@ impl Service for Simulator {
         }
         Ok(Self {
             flight: Simulation::in_world(world, &start.vehicle, &options),
-            pings: ports.input(8)?,
+            pings: ports.input()?,
             echoes: ports.output()?,
             truths: ports.output()?,
             controller,
@@ -140,7 +140,10 @@ impl Simulator {
             let _ = self.controller.write(&chunk[..count]);
         }
         let Some(flow) = &mut self.flow else { return };
-        open(&mut **flow, self.steps);
+        if open(&mut **flow, self.steps) {
+            // The sensor hears nothing; reading is how the device notices that its reader is gone.
+            let _ = flow.read(&mut chunk);
+        }
         loop {
             let count = self.flight.flow_read(&mut chunk);
             if count == 0 {

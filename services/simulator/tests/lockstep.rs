@@ -15,7 +15,7 @@ fn truths(seed: u64, seconds: u64) -> Vec<Truth> {
     let (manifest, root) = load_manifest(&deploy()).unwrap();
     let mut bus = Lockstep::new(manifest, &root, seed, Cache::default());
     let mut ports = bus.tool("cli");
-    let mut truth = ports.input::<Truth>(16).unwrap();
+    let mut truth = ports.input::<Truth>().unwrap();
     bus.add_with::<Simulator>(Config::default()).unwrap();
     let mut all = Vec::new();
     let begin = bus.now();

@@ -18,7 +18,7 @@ impl Simulated {
     pub(crate) fn new(ports: &mut Ports, incarnation: u32) -> Result<Self, StartError> {
         Ok(Self {
             pings: ports.output()?,
-            echoes: ports.input(8)?,
+            echoes: ports.input()?,
             group: 0,
             // An echo to a ping of the process before this one must not be taken for ours.
             ping: incarnation.wrapping_mul(0x0010_0000),

@@ -44,7 +44,7 @@ impl Bench {
         let manifest = manifest::Manifest::parse("test.toml", MANIFEST).unwrap();
         let mut system = Lockstep::new(manifest, Path::new(directory.path()), 3, Cache::default());
         let mut world = system.tool("world");
-        let bench = (world.input(8).unwrap(), world.output().unwrap(), world.input(16).unwrap());
+        let bench = (world.input().unwrap(), world.output().unwrap(), world.input().unwrap());
         system.add::<sonar::Sonar>()?;
         let (pings, echoes, ranges) = bench;
         Ok(Self { system, pings, echoes, ranges, _directory: directory })

@@ -53,6 +53,30 @@ fn a_service_that_always_dies_is_started_ever_more_rarely() {
 }
 
 #[test]
+fn a_slow_start_that_fails_is_no_health() {
+    let (mut life, t) = life("always");
+    let mut now = t;
+    // Each start works for 9 s and dies, or is killed at 10 s, without ever being ready.
+    for (failures, ends) in [false, true, false, true, false].into_iter().enumerate() {
+        let due = life.deadline().unwrap();
+        assert_eq!(due, now + RestartPolicy::default().delay(failures as u32), "after {failures} failures");
+        assert_eq!(life.due(due), Some(Action::Spawn));
+        life.spawned(due);
+        now = due + if ends { Duration::from_secs(9) } else { Duration::from_secs(10) };
+        assert_eq!(life.due(now), (!ends).then_some(Action::KillLate));
+        life.ended(false, now);
+    }
+    assert_eq!(life.word(), "failing");
+    // Ready for too short a time is none either.
+    let due = life.deadline().unwrap();
+    life.spawned(due);
+    life.ready(due + Duration::from_secs(9));
+    now = due + Duration::from_secs(10);
+    life.ended(false, now);
+    assert!(life.deadline().unwrap() > now);
+}
+
+#[test]
 fn policies_decide_what_a_clean_exit_means() {
     for (policy, success, word) in [
         ("always", true, "waiting"),

@@ -34,6 +34,7 @@ impl<S: SharedMemory> Supervisor<S> {
             Request::Ping => Response::Pong {
                 pid: std::process::id(),
                 system: self.manifest.system.name.clone(),
+                run_dir: self.around.run_dir.to_string_lossy().into_owned(),
                 manifests: self.around.manifests.split(':').map(str::to_owned).collect(),
                 simulated: self.manifest.system.simulated,
             },

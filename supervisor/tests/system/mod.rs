@@ -28,6 +28,7 @@ impl SharedMemory for Pretended {
     fn recover(&mut self, service: &str) -> Vec<String> {
         vec![format!("{service}/state")]
     }
+    fn tidy(&mut self) {}
     fn airborne(&self) -> bool {
         self.0.join("airborne").exists()
     }

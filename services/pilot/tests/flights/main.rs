@@ -347,14 +347,20 @@ fn a_command_is_obeyed_once() {
     let retained = rig.state;
     rig.restart(100);
     assert_eq!(rig.state.command_sequence, retained.command_sequence);
-    let command = ipc_types::Command {
+    let mut command = ipc_types::Command {
+        expiry_ns: rig.now + ipc_types::COMMAND_LIFE_NS,
         verb: Verb::TakeOff.code().into(),
         command_sequence: retained.command_sequence,
         ..Default::default()
     };
+    command.header.stamp_ns = rig.now;
     rig.core.command(rig.now, &command);
     rig.run(1.0);
     assert_eq!(rig.phase(), Phase::Grounded);
+    // With another number it would have been obeyed: that is what the assertion above can fail by.
+    command.command_sequence += 1;
+    rig.core.command(rig.now, &command);
+    assert_eq!(rig.phase(), Phase::Arming);
 }
 
 #[test]

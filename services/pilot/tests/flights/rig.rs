@@ -5,8 +5,8 @@
 use control::{Tilt, Vector, stick};
 use floorplan::{DistanceField, Plan};
 use ipc_types::{
-    Channels, Command, LinkState, LocalizationState, Phase, PilotState, Pose, Setpoint, SetpointKind,
-    SonarHealth, SonarRanges, Verb,
+    COMMAND_LIFE_NS, Channels, Command, LinkState, LocalizationState, Phase, PilotState, Pose, Setpoint,
+    SetpointKind, SonarHealth, SonarRanges, Verb,
 };
 use pilot::{Craft, PilotConfig, PilotCore};
 use std::collections::VecDeque;
@@ -175,8 +175,13 @@ impl Rig {
 
     pub(crate) fn order(&mut self, verb: Verb) {
         self.sequence += 1;
-        let command =
-            Command { verb: verb.code().into(), command_sequence: self.sequence, ..Default::default() };
+        let mut command = Command {
+            expiry_ns: self.now + COMMAND_LIFE_NS,
+            verb: verb.code().into(),
+            command_sequence: self.sequence,
+            ..Default::default()
+        };
+        command.header.stamp_ns = self.now;
         self.core.command(self.now, &command);
     }
 

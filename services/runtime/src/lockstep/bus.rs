@@ -17,6 +17,9 @@ const DELAY_SPREAD_NS: u64 = 950_000;
 const LATE_ONE_IN: u64 = 100;
 const DELAY_LATE_NS: u64 = 6_000_000;
 
+/// Publishers of one topic that memory is set aside for: as many as shared memory has places for.
+const PUBLISHERS: usize = 4;
+
 /// One message waiting in one input.
 struct Waiting<T> {
     visible_ns: u64,
@@ -53,8 +56,8 @@ struct Topic<T> {
     pool: RefCell<Vec<Rc<T>>>,
     pool_size: Cell<usize>,
     readers: RefCell<Vec<Rc<Queue<T>>>>,
-    /// The newest message of a live publisher: what a late joiner gets.
-    newest: RefCell<Option<Rc<T>>>,
+    /// The newest message of each live publisher: what a late joiner gets.
+    newest: RefCell<Vec<Rc<T>>>,
     /// The newest message of any publisher, dead ones included: what the keeper holds.
     kept: RefCell<Option<Rc<T>>>,
 }
@@ -65,7 +68,7 @@ trait AnyTopic {
     fn next_wake(&self, service: &str, now: u64) -> u64;
     /// Fills the pool so that no later loan allocates.
     fn fill_pool(&self);
-    fn publisher_died(&self);
+    fn publisher_died(&self, publisher: u32);
     fn forget_closed_readers(&self);
     fn as_any(self: Rc<Self>) -> Rc<dyn Any>;
 }
@@ -88,7 +91,9 @@ impl<T: Message> AnyTopic for Topic<T> {
     fn fill_pool(&self) {
         let limits = Limits::of::<T>();
         let readers = self.readers.borrow();
-        let wanted: usize = 4 + readers.iter().map(|queue| queue.depth + limits.held.min(2)).sum::<usize>();
+        // One each for the newest of every publisher, one for the keeper, two for loans.
+        let wanted: usize =
+            PUBLISHERS + 3 + readers.iter().map(|queue| queue.depth + limits.held.min(2)).sum::<usize>();
         self.pool_size.set(wanted);
         let mut pool = self.pool.borrow_mut();
         pool.reserve(wanted);
@@ -97,8 +102,8 @@ impl<T: Message> AnyTopic for Topic<T> {
         }
     }
 
-    fn publisher_died(&self) {
-        *self.newest.borrow_mut() = None;
+    fn publisher_died(&self, publisher: u32) {
+        self.newest.borrow_mut().retain(|known| known.header().publisher != publisher);
     }
 
     fn forget_closed_readers(&self) {
@@ -142,7 +147,7 @@ impl Bus {
             pool: RefCell::default(),
             pool_size: Cell::new(0),
             readers: RefCell::default(),
-            newest: RefCell::new(None),
+            newest: RefCell::new(Vec::with_capacity(PUBLISHERS)),
             kept: RefCell::new(None),
         });
         topics.push((name.to_owned(), Rc::clone(&topic) as Rc<dyn AnyTopic>));
@@ -165,8 +170,9 @@ impl Bus {
             wakes: wake.then(|| service.to_owned()),
             closed: Cell::new(false),
         });
-        if let Some(newest) = topic.newest.borrow().as_ref() {
-            let visible_ns = self.now.get() + queue.delays.draw_ns();
+        let mut visible_ns = 0;
+        for newest in topic.newest.borrow().iter() {
+            visible_ns = visible_ns.max(self.now.get() + queue.delays.draw_ns());
             queue.waiting.borrow_mut().push_back(Waiting { visible_ns, slot: Rc::clone(newest) });
         }
         topic.readers.borrow_mut().push(Rc::clone(&queue));
@@ -206,11 +212,9 @@ impl Bus {
     }
 
     /// A service died: late joiners get nothing from it any more, and its queues are gone.
-    pub(crate) fn died(&self, published: impl Fn(&str) -> bool) {
-        for (name, topic) in self.topics.borrow().iter() {
-            if published(name) {
-                topic.publisher_died();
-            }
+    pub(crate) fn died(&self, publisher: u32) {
+        for (_, topic) in self.topics.borrow().iter() {
+            topic.publisher_died(publisher);
             topic.forget_closed_readers();
         }
     }
@@ -270,7 +274,13 @@ impl<T: Message> LockstepOutput<T> {
             }
             waiting.push_back(Waiting { visible_ns, slot: Rc::clone(&slot) });
         }
-        *self.topic.newest.borrow_mut() = Some(Rc::clone(&slot));
+        {
+            let mut newest = self.topic.newest.borrow_mut();
+            let publisher = slot.header().publisher;
+            // In the order in which they were sent.
+            newest.retain(|known| known.header().publisher != publisher);
+            newest.push(Rc::clone(&slot));
+        }
         *self.topic.kept.borrow_mut() = Some(Rc::clone(&slot));
         self.topic.pool.borrow_mut().push(slot);
     }

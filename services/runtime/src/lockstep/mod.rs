@@ -4,7 +4,7 @@ pub(crate) mod bus;
 
 use crate::device::NoDevices;
 use crate::port::{BusKind, StepContext};
-use crate::{Cache, Ports, Service, Start, StartError, access, mix_seed, parse_config};
+use crate::{Cache, Ports, Service, Start, StartError, mix_seed, parse_config};
 use bus::Bus;
 use manifest::Manifest;
 use std::path::{Path, PathBuf};
@@ -155,6 +155,7 @@ impl Lockstep {
         )?;
         let mut ports = self.ports(S::NAME, incarnation);
         let service = S::start(config, &mut ports, &start)?;
+        ports.check_all_opened()?;
         // The first tick of each service falls somewhere within its first period.
         let phase = if period_ns == u64::MAX {
             u64::MAX
@@ -185,6 +186,9 @@ impl Lockstep {
             manifest: Rc::clone(&self.manifest),
             context,
             inputs: Vec::new(),
+            outputs: Vec::new(),
+            opened: Vec::new(),
+            forgotten: Vec::new(),
             devices: Box::new(NoDevices),
             retained,
         }
@@ -201,8 +205,7 @@ impl Lockstep {
     /// published last on its retained topics.
     pub fn kill(&mut self, name: &str) {
         self.services.retain(|running| running.name != name);
-        let manifest = Rc::clone(&self.manifest);
-        self.bus.died(|topic| access::may_publish(&manifest, name, topic));
+        self.bus.died(StepContext::publisher_of(name));
     }
 
     /// Messages refused by a service because they made no sense; 0 for one that does not run.

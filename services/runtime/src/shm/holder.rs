@@ -48,7 +48,7 @@ impl<T: Message> Keep for Kept<T> {
     }
 
     fn keep(&mut self) {
-        while let Some(sample) = self.input.receive() {
+        while let Ok(Some(sample)) = self.input.receive() {
             self.newest = Some(sample);
         }
         self.output.update_connections();
@@ -65,7 +65,8 @@ impl<T: Message> Keep for Kept<T> {
         let Some(mut loan) = self.spare.take().or_else(|| self.output.loan()) else { return false };
         bytemuck::bytes_of_mut(&mut *loan).copy_from_slice(bytemuck::bytes_of(&**newest));
         self.newest = None;
-        self.output.send(loan);
+        // A reader that vanished asks again when it is back, and finds the copy in the history.
+        let _ = self.output.send(loan);
         self.spare = self.output.loan();
         self.offered = true;
         true
@@ -80,6 +81,7 @@ pub struct Holder {
     command: Option<SharedOutput<Command>>,
     command_sequence: u64,
     held: Vec<Box<dyn Any>>,
+    services: Vec<String>,
     node: Rc<SharedNode>,
 }
 
@@ -183,7 +185,17 @@ impl Holder {
         } else {
             None
         };
-        Ok(Self { kept, pilot_state, newest_pilot_state: None, command, command_sequence: 0, held, node })
+        let services = manifest.services.keys().cloned().collect();
+        Ok(Self {
+            kept,
+            pilot_state,
+            newest_pilot_state: None,
+            command,
+            command_sequence: 0,
+            held,
+            services,
+            node,
+        })
     }
 
     /// Takes the newest sample of every retained topic and serves late joiners. To be called at every turn
@@ -193,7 +205,7 @@ impl Holder {
             keep.keep();
         }
         if let Some(input) = &mut self.pilot_state {
-            while let Some(state) = input.receive() {
+            while let Ok(Some(state)) = input.receive() {
                 self.newest_pilot_state = Some(*state);
             }
         }
@@ -217,6 +229,28 @@ impl Holder {
         let _ = self.node.node().try_cleanup_dead_nodes();
     }
 
+    /// Removes what dead programs beside the services left behind: each would hold one of the few places among
+    /// publishers and nodes for ever. Services are left to [`Holder::cleanup_dead_nodes`], after their last words
+    /// were taken. To be called about once a second; it reads one directory when nobody died.
+    pub fn cleanup_dead_tools(&self) {
+        use iceoryx2::node::{Node, NodeState, NodeView};
+        use iceoryx2::prelude::CallbackProgression;
+        let node = self.node.node();
+        // What cannot be listed or removed now is tried again the next time.
+        let _ = Node::<ipc::Service>::list(node.config(), |state| {
+            if let NodeState::Dead(dead) = state
+                && dead.details().as_ref().is_some_and(|details| !self.is_service(details.name().as_str()))
+            {
+                let _ = dead.try_remove_stale_resources();
+            }
+            CallbackProgression::Continue
+        });
+    }
+
+    fn is_service(&self, name: &str) -> bool {
+        self.services.iter().any(|service| service == name)
+    }
+
     /// The newest state of the pilot, if there ever was one.
     #[must_use]
     pub fn pilot_state(&self) -> Option<&PilotState> {
@@ -230,8 +264,7 @@ impl Holder {
         self.command_sequence += 1;
         *loan = *command;
         loan.header = Header { stamp_ns: now, sequence: self.command_sequence, publisher: 0, incarnation: 0 };
-        output.send(loan);
-        true
+        output.send(loan).is_ok()
     }
 
     /// How many things are held.

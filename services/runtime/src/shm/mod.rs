@@ -14,5 +14,5 @@ mod wait;
 pub use holder::{Holder, ShmError};
 pub use names::RunDir;
 pub(crate) use node::SharedNode;
-pub(crate) use ports::{SharedInput, SharedLoan, SharedOutput, SharedSample};
+pub(crate) use ports::{Refused, SharedInput, SharedLoan, SharedOutput, SharedSample};
 pub(crate) use wait::woken_within;

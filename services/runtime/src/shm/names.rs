@@ -12,9 +12,13 @@ use std::path::{Path, PathBuf};
 pub struct RunDir(PathBuf);
 
 impl RunDir {
-    /// The run directory at `path`; nothing is created yet.
+    /// The run directory at `path`; nothing is created yet. `x`, `x/` and `./x` are the same.
     pub fn new(path: impl Into<PathBuf>) -> Self {
-        Self(path.into())
+        let path = path.into();
+        // Without a working directory the path stays as it is.
+        let absolute = std::path::absolute(&path).unwrap_or(path);
+        // `absolute` keeps a slash at the end; the sequence of components has none.
+        Self(absolute.components().collect())
     }
 
     /// The directory.
@@ -90,5 +94,20 @@ impl RunDir {
             .map(|entry| entry.file_name().to_string_lossy().into_owned())
             .filter(|name| name.starts_with(&prefix))
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_directory_is_one_system_however_it_is_written() {
+        let here = std::env::current_dir().unwrap();
+        let plain = RunDir::new(here.join("run"));
+        for spelling in ["run", "run/", "./run", "run/.", ".//run//"] {
+            assert_eq!(RunDir::new(spelling).prefix(), plain.prefix(), "{spelling}");
+        }
+        assert_ne!(RunDir::new("run2").prefix(), plain.prefix());
     }
 }

@@ -208,7 +208,7 @@ impl SharedNode {
         let mut input = self.input::<T>(&keeper_topic(T::TOPIC), 1)?;
         let began = Instant::now();
         loop {
-            if let Some(sample) = input.receive() {
+            if let Ok(Some(sample)) = input.receive() {
                 let mut copy = bytemuck::allocation::zeroed_box::<T>();
                 bytemuck::bytes_of_mut(&mut *copy).copy_from_slice(bytemuck::bytes_of(&*sample));
                 return Ok(Some(copy));

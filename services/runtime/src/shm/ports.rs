@@ -10,6 +10,10 @@ use iceoryx2::sample_mut::SampleMut;
 use ipc_types::Message;
 use std::ops::{Deref, DerefMut};
 
+/// Shared memory refused; counted by the caller, since there is nothing else to be done in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Refused;
+
 /// A received message where it lies in shared memory.
 pub(crate) struct SharedSample<T: Message>(Sample<ipc::Service, Payload<T>, ()>);
 
@@ -29,9 +33,10 @@ impl<T: Message> SharedInput<T> {
         Self { subscriber }
     }
 
-    /// The oldest message not yet taken. A publisher that vanished in the middle is no error of ours.
-    pub(crate) fn receive(&mut self) -> Option<SharedSample<T>> {
-        self.subscriber.receive().ok().flatten().map(SharedSample)
+    /// The oldest message not yet taken. `Err` when shared memory refuses: a publisher that vanished in the middle, or
+    /// too many messages held.
+    pub(crate) fn receive(&mut self) -> Result<Option<SharedSample<T>>, Refused> {
+        self.subscriber.receive().map(|sample| sample.map(SharedSample)).map_err(|_| Refused)
     }
 }
 
@@ -73,12 +78,14 @@ impl<T: Message> SharedOutput<T> {
         Some(SharedLoan(sample))
     }
 
-    pub(crate) fn send(&self, loan: SharedLoan<T>) {
-        // A reader that vanished in the middle is no error of ours; the others have the message.
-        let _ = loan.0.send();
+    /// `Err` when not every reader has it or could be woken: one that vanished in the middle, for instance. The others
+    /// have the message.
+    pub(crate) fn send(&self, loan: SharedLoan<T>) -> Result<(), Refused> {
+        let mut all = loan.0.send().is_ok();
         for notifier in &self.notifiers {
-            let _ = notifier.notify();
+            all &= notifier.notify().is_ok();
         }
+        if all { Ok(()) } else { Err(Refused) }
     }
 
     pub(crate) fn update_connections(&self) {
