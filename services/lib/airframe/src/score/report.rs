@@ -135,6 +135,8 @@ pub struct Report {
     pub flights: Vec<FlightReport>,
     /// All together.
     pub total: Totals,
+    /// What a reader of the figures must know of the building: where the pad was put and why, what is not known.
+    pub remarks: Vec<String>,
 }
 
 impl Report {
@@ -155,7 +157,7 @@ impl Report {
             min_clearance_m: if nearest.is_finite() { nearest } else { 0.0 },
             real_time_factor,
         };
-        Self { flights: reports, total }
+        Self { flights: reports, total, remarks: Vec::new() }
     }
 }
 
