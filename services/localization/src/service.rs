@@ -87,7 +87,7 @@ impl Service for Localization {
         let pad = place(&config.start, start, &plan)?;
         let hash = fold(plan.hash());
         let model = ConeModel { max_range_m: config.sonar.max_range, ..ConeModel::default() };
-        let table = start.shared(&format!("cone table {model:?}"), || {
+        let table = start.shared(&format!("cone table {} {model:?}", start.system.plan), || {
             let table = ConeTable::new(plan, model);
             // No look-up in flight is to allocate.
             table.allocate();
