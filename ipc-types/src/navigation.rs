@@ -154,6 +154,8 @@ codes! {
         Seen = 2 => "seen",
         /// Left out, with a reason.
         Skipped = 3 => "skipped",
+        /// Nothing more of it can be seen in this round, with a reason.
+        PartlySeen = 4 => "partly seen",
     }
 }
 
@@ -162,7 +164,7 @@ fields! {
     pub struct RoomProgress {
         /// As in the sidecar file, or `Room 3`.
         pub name: Text<32>,
-        /// Why it was skipped; empty otherwise.
+        /// Why it was skipped or seen in part only; empty otherwise.
         pub reason: Text<64>,
         /// Share of the room's cells seen, 0..1.
         pub seen: f32,

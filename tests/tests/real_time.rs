@@ -34,11 +34,7 @@ fn processes_in_real_time_end_as_lockstep_does_and_know_their_place_as_well() {
     let lines =
         sereno(&deploy, &run_dir, &["demo", "--once", "--json", "--seed", SEED, "--picture", picture]);
     let real: Value = serde_json::from_str(lines.lines().last().unwrap()).unwrap();
-    let text = sereno(
-        &deploy,
-        &run_dir,
-        &["rehearse", "--clutter", "light", "--seed", SEED, "--json", "--out", "-"],
-    );
+    let text = sereno(&deploy, &run_dir, &["rehearse", "--clutter", "light", "--seed", SEED, "--json"]);
     let lockstep: Value = serde_json::from_str(&text).unwrap();
     let lockstep = &lockstep["flights"][0];
 

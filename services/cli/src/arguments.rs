@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::operate::Order;
+use anyhow::{Result, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli::place::Place;
 use std::path::PathBuf;
@@ -78,6 +79,9 @@ pub(crate) enum Verb {
     /// Check manifest, configurations, vehicle and plan.
     Check,
     /// Fly the round in the simulator, many times faster than life, and measure it by the truth.
+    ///
+    /// Exits with 0 when all flights were flown and their figures written, whatever their outcome: contacts and
+    /// failsafes are figures, not errors.
     Rehearse(Rehearse),
     /// Start the simulated system, fly one round, draw it and report on it.
     Demo(Demo),
@@ -151,6 +155,10 @@ pub(crate) struct Rehearse {
     /// World file: furniture, doors, people; without one the plan's walls are the world.
     #[arg(long)]
     pub world: Option<PathBuf>,
+    /// Where the drone starts and lands: x and y on the plan, metres, and the heading, degrees. What the plan's side
+    /// file or the world file says when absent, and the widest free place of the plan where they say nothing.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = pad, allow_hyphen_values = true)]
+    pub pad: Option<[f32; 3]>,
     /// What the plan does not show: none, light or full.
     #[arg(long, default_value = "full")]
     pub clutter: String,
@@ -163,18 +171,84 @@ pub(crate) struct Rehearse {
     /// Seed of the first flight; flight k is drawn from this and k alone.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Flights at the same time; all cores when absent.
+    /// How obstacles are avoided: vfh.
+    #[arg(long, default_value = AVOID)]
+    pub avoid: String,
+    /// Where the drone stands at first: pad.
+    #[arg(long, default_value = START)]
+    pub start: String,
+    /// Flights at the same time, 1 to 256; all cores when absent.
     #[arg(long)]
     pub threads: Option<usize>,
     /// Cruise speed, metres a second, instead of the vehicle's.
     #[arg(long)]
     pub speed: Option<f64>,
-    /// Write the figures as JSON to this file (`-` for standard output).
-    #[arg(long = "out")]
-    pub out: Option<PathBuf>,
     /// Write a picture of every flight into this directory.
     #[arg(long)]
     pub pictures: Option<PathBuf>,
+    /// With --json: write the JSON to this file, and the table for people to standard output as without.
+    pub out: Option<PathBuf>,
+}
+
+/// A place and a heading, as `2.5,1.0,90`.
+fn pad(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Vec<f32> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    match (text.split(',').count(), numbers.as_slice()) {
+        (3, &[x, y, degrees]) if x.abs() <= PAD_M && y.abs() <= PAD_M && degrees.abs() <= 360.0 => {
+            Ok([x, y, degrees])
+        }
+        _ => Err(format!(
+            "allowed is X,Y,DEG: -{PAD_M} to {PAD_M} m and -360 to 360 degrees, such as 2.5,1,90"
+        )),
+    }
+}
+
+/// Farthest coordinate of a pad, as in a plan's side file.
+const PAD_M: f32 = 10_000.0;
+/// The one way of avoiding obstacles that navigation has.
+const AVOID: &str = "vfh";
+/// The one place that localization starts from: it searches no building for the drone.
+const START: &str = "pad";
+/// More flights at once than any machine has cores for.
+const MOST_THREADS: usize = 256;
+/// More than a month of rehearsals.
+const MOST_FLIGHTS: u64 = 100_000;
+
+impl Rehearse {
+    /// Refuses what cannot be flown, in one sentence.
+    pub(crate) fn check(&self, json: bool) -> Result<()> {
+        if self.avoid != AVOID {
+            bail!("--avoid {} is not possible: nothing implements it yet; possible is {AVOID}", self.avoid);
+        }
+        if self.start != START {
+            bail!(
+                "--start {} is not possible: localization starts from the pad only; possible is {START}",
+                self.start
+            );
+        }
+        if !(1..=MOST_FLIGHTS).contains(&self.flights) {
+            bail!("--flights {} is out of range: allowed is 1..={MOST_FLIGHTS}", self.flights);
+        }
+        if self.seed.checked_add(self.flights - 1).is_none() {
+            bail!(
+                "--seed {} is out of range: allowed is 0..={} with {} flights",
+                self.seed,
+                u64::MAX - (self.flights - 1),
+                self.flights
+            );
+        }
+        if let Some(threads) = self.threads
+            && !(1..=MOST_THREADS).contains(&threads)
+        {
+            bail!("--threads {threads} is out of range: allowed is 1..={MOST_THREADS}");
+        }
+        if let Some(out) = &self.out
+            && !json
+        {
+            bail!("{}: a file is written with --json only: `rehearse ... --json {0}`", out.display());
+        }
+        Ok(())
+    }
 }
 
 #[derive(Debug, Args)]
@@ -195,4 +269,80 @@ pub(crate) struct Demo {
     /// with --once this must lead to no more than a hover.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100))]
     pub kills: u32,
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
+mod tests {
+    use super::*;
+
+    /// The command line of DESIGN 5, with every option it names.
+    const CONTRACT: &str = "sereno rehearse --plan plan.yaml --world world.toml --clutter full --vehicle watchman \
+                            --flights 20 --seed 1 --avoid vfh --start pad --json OUT";
+
+    fn rehearsal(line: &str) -> (Rehearse, bool) {
+        let arguments = Arguments::try_parse_from(line.split_whitespace()).unwrap();
+        let Verb::Rehearse(rehearse) = arguments.verb else { panic!("{line}") };
+        (rehearse, arguments.json)
+    }
+
+    fn refusal(from: &str, to: &str) -> String {
+        assert!(CONTRACT.contains(from));
+        let (rehearse, json) = rehearsal(&CONTRACT.replace(from, to));
+        let said = rehearse.check(json).unwrap_err().to_string();
+        assert_eq!(said.lines().count(), 1, "{said}");
+        said
+    }
+
+    #[test]
+    fn the_command_line_is_the_contracts() {
+        let (rehearse, json) = rehearsal(CONTRACT);
+        rehearse.check(json).unwrap();
+        assert!(json);
+        assert_eq!(rehearse.out, Some(PathBuf::from("OUT")));
+        assert_eq!(rehearse.plan, Some(PathBuf::from("plan.yaml")));
+        assert_eq!(rehearse.world, Some(PathBuf::from("world.toml")));
+        assert_eq!((rehearse.flights, rehearse.seed), (20, 1));
+        let (bare, json) = rehearsal("sereno rehearse");
+        bare.check(json).unwrap();
+        assert_eq!((bare.out, json), (None, false));
+        for line in ["sereno rehearse --json", "sereno --json rehearse"] {
+            let (rehearse, json) = rehearsal(line);
+            rehearse.check(json).unwrap();
+            assert_eq!((rehearse.out, json), (None, true), "{line}");
+        }
+    }
+
+    #[test]
+    fn a_pad_is_three_numbers() {
+        let (rehearse, _) = rehearsal("sereno rehearse --pad -9.5,2,90 --flights 1");
+        assert_eq!(rehearse.pad, Some([-9.5, 2.0, 90.0]));
+        for wrong in ["1,2", "1,2,3,4", "1,b,3", "nan,1,2", "1,2,400", ""] {
+            let error = Arguments::try_parse_from(["sereno", "rehearse", "--pad", wrong]).unwrap_err();
+            assert!(error.to_string().contains("X,Y,DEG"), "{wrong}: {error}");
+        }
+    }
+
+    #[test]
+    fn what_nothing_implements_is_refused_with_what_is_possible() {
+        assert!(refusal("--avoid vfh", "--avoid potential").contains("possible is vfh"));
+        for word in ["room", "unknown", "roof"] {
+            let said = refusal("--start pad", &format!("--start {word}"));
+            assert!(said.contains(word) && said.contains("possible is pad"), "{said}");
+        }
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_refused_with_the_range() {
+        assert!(refusal("--flights 20", "--flights 0").contains("1..=100000"));
+        let said = refusal("--seed 1", "--seed 18446744073709551600");
+        assert!(said.contains("0..=18446744073709551596"), "{said}");
+        let last = rehearsal(&CONTRACT.replace("--seed 1", "--seed 18446744073709551596")).0;
+        last.check(true).unwrap();
+        for threads in ["0", "257", "18446744073709551615"] {
+            let said = refusal("--seed 1", &format!("--seed 1 --threads {threads}"));
+            assert!(said.contains(threads) && said.contains("1..=256"), "{said}");
+        }
+        assert!(refusal("--json OUT", "OUT").contains("with --json only"));
+    }
 }

@@ -87,7 +87,7 @@ impl Service for Localization {
         let pad = place(&config.start, start, &plan)?;
         let hash = fold(plan.hash());
         let model = ConeModel { max_range_m: config.sonar.max_range, ..ConeModel::default() };
-        let table = start.shared(&format!("cone table {model:?}"), || {
+        let table = start.shared(&format!("cone table {} {model:?}", start.system.plan), || {
             ConeTable::new(plan, model).map_err(StartError::invalid)
         })?;
         let filter =

@@ -1,4 +1,4 @@
-//! Where the drone starts: the pad of the plan's sidecar file, or what the configuration says.
+//! Where the drone starts: the system's pad, or what the configuration says.
 
 use crate::StartSection;
 use floorplan::{Cell, Plan};
@@ -21,10 +21,11 @@ pub(crate) fn place(config: &StartSection, start: &Start, plan: &Plan) -> Result
         Some(place) => place,
         None => {
             let name = start.sidecar_name();
-            let pad = start.sidecar()?.pad.ok_or_else(|| {
+            let pad = start.pad()?.ok_or_else(|| {
                 StartError::Invalid(format!(
-                    "{name} names no pad; add `pad: {{x: ..., y: ..., heading_deg: ...}}`, or give start.x_m, \
-                     start.y_m and start.heading_deg in the localization configuration"
+                    "{name} names no pad; add `pad: {{x: ..., y: ..., heading_deg: ...}}`, or give pad = [x, y, degrees] \
+                     in the manifest's [system], or start.x_m, start.y_m and start.heading_deg in the localization \
+                     configuration"
                 ))
             })?;
             Place { x: pad.x, y: pad.y, heading: pad.heading_rad() }

@@ -103,6 +103,8 @@ pub struct Journey {
     pub(crate) setbacks: Setbacks,
     pub(crate) since_trim: u32,
     pub(crate) round: bool,
+    /// Every place of the round that was to be looked from has been passed or given up.
+    pub(crate) looked: bool,
     trouble: Text<64>,
     /// The planning that was asked for begins with a clean slate.
     afresh: bool,
@@ -143,6 +145,7 @@ impl Journey {
             setbacks: Setbacks::new(),
             since_trim: 0,
             round: false,
+            looked: false,
             trouble: Text::default(),
             afresh: false,
             pardon: None,
@@ -175,6 +178,7 @@ impl Journey {
         self.seen_before.clear();
         self.review = false;
         self.kept = None;
+        self.looked = false;
     }
 
     /// Takes over what an earlier run has seen.
@@ -295,6 +299,7 @@ impl Journey {
             self.target += 1;
             self.since_trim = TRIM_EVERY;
         }
+        self.looked |= self.homeward();
     }
 
     /// Adds a point to corners and track; one that repeats the last only names its stop.

@@ -69,9 +69,12 @@ impl Journey {
                 _ if self.has_stop_in(room) => RoomState::Entered,
                 _ if self.gave_up_in(room) => {
                     progress.reason.set("blocked by something not on the plan");
-                    if share < 0.5 { RoomState::Skipped } else { RoomState::Seen }
+                    if share < ENTERED_SHARE { RoomState::Skipped } else { RoomState::PartlySeen }
                 }
-                _ if share >= 0.5 => RoomState::Seen,
+                _ if share >= ENTERED_SHARE && self.looked => {
+                    progress.reason.set("no place left that shows more of it");
+                    RoomState::PartlySeen
+                }
                 _ if share >= ENTERED_SHARE => RoomState::Entered,
                 _ => RoomState::Waiting,
             };

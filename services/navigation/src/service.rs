@@ -43,9 +43,10 @@ pub fn atlas_of(start: &Start) -> Result<Arc<Atlas>, StartError> {
     let radius_m = start.vehicle.body.radius_m;
     // Before the other: what is built for sharing may not ask for something shared.
     let plan = start.plan()?;
-    // The radius is in the key: vehicles of one rehearsal may differ.
-    start.shared(&format!("navigation atlas {} {radius_m}", start.system.plan), || {
-        let sidecar = start.sidecar()?;
+    let pad = start.pad()?;
+    // Radius and pad are in the key: vehicles of one rehearsal may differ.
+    start.shared(&format!("navigation atlas {} {radius_m} {pad:?}", start.system.plan), || {
+        let sidecar = floorplan::Sidecar { pad, ..start.sidecar()? };
         let rooms = Rooms::of(&start.system.plan, &sidecar, &plan).map_err(StartError::invalid)?;
         Ok(Atlas::new(Arc::clone(&plan), rooms, &sidecar, radius_m))
     })

@@ -283,6 +283,21 @@ fn rooms_behind_shut_doors_are_skipped_by_name_with_the_reason() {
     assert_eq!(room(&patrol, "West").state, u32::from(RoomState::Seen.code()));
 }
 
+/// A partition that no plan shows cuts the upper half of West off; its other door is shut.
+#[test]
+fn a_room_seen_in_part_is_reported_so_with_share_and_reason() {
+    let mut flight = Flight::new(&[1], &[(1, 30, 39, 31)]);
+    flight.order(Verb::PatrolStart, f32::NAN, f32::NAN);
+    flight.fly(900.0);
+    assert_eq!(flight.core.mission().state(), PatrolState::Done, "{}", flight.core.text());
+    let patrol = flight.report();
+    let west = room(&patrol, "West");
+    assert!((0.3..0.95).contains(&west.seen), "{}", west.seen);
+    assert_eq!(west.state, u32::from(RoomState::PartlySeen.code()), "{} {}", west.state, west.reason);
+    assert!(!west.reason.as_str().is_empty());
+    assert_eq!(room(&patrol, "South").state, u32::from(RoomState::Seen.code()));
+}
+
 /// Somebody stands in the North door three times that the drone comes by, and is gone afterwards; the South door stays shut.
 #[test]
 fn while_most_of_the_building_lies_behind_them_doors_are_tried_again() {

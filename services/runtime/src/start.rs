@@ -1,7 +1,7 @@
 //! What a service is given when it starts.
 
 use crate::{StartError, fnv};
-use floorplan::{Plan, Sidecar};
+use floorplan::{Pad, Plan, Sidecar};
 use manifest::{System, Vehicle};
 use std::any::Any;
 use std::cell::Cell;
@@ -139,6 +139,18 @@ impl Start {
             return Ok(Sidecar::default());
         }
         Sidecar::parse(&name, &self.read(&name)?).map_err(StartError::invalid)
+    }
+
+    /// Where the drone starts and lands: what the manifest says before what the plan's side file says; `None` when
+    /// neither says it. Simulator, localization and navigation all ask here, so that they cannot differ.
+    ///
+    /// # Errors
+    /// When the side file is there and wrong.
+    pub fn pad(&self) -> Result<Option<Pad>, StartError> {
+        if let Some([x, y, heading_deg]) = self.system.pad {
+            return Ok(Some(Pad { x, y, heading_deg }));
+        }
+        Ok(self.sidecar()?.pad)
     }
 
     /// Something heavy and read-only, built once and shared between the flights of a rehearsal.

@@ -18,6 +18,7 @@ mod plan;
 mod rooms;
 mod sidecar;
 mod surface;
+mod widest;
 
 pub use cast::{ConeModel, Hit, cast_cone};
 pub use cone_table::ConeTable;
@@ -27,3 +28,4 @@ pub use header::{PictureMode, PlanHeader};
 pub use plan::{Cell, MAX_CELLS, MAX_SIDE, Plan};
 pub use rooms::{MAX_ROOMS, Rooms};
 pub use sidecar::{Area, Door, NamedArea, Pad, Sidecar};
+pub use widest::widest_place;

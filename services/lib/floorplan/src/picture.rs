@@ -26,6 +26,16 @@ pub(crate) fn read(file: &str, header: &PlanHeader, bytes: &[u8]) -> Result<(usi
     limits.max_image_height = Some(MAX_SIDE as u32);
     reader.limits(limits);
     let picture = reader.decode().map_err(|error| not_an_image(&error))?;
+    if header.mode == PictureMode::Raw && picture.color().bytes_per_pixel() != picture.color().channel_count()
+    {
+        // Percents of a 16-bit scale would all be taken for nought: free, every wall of them.
+        return Err(PlanError::range(
+            file,
+            "mode",
+            &"raw with a 16-bit picture",
+            "raw with an 8-bit picture",
+        ));
+    }
     Ok((width as usize, cells(header, &picture)))
 }
 

@@ -159,7 +159,7 @@ impl Rooms {
 }
 
 /// The connected parts (over sides) of the marked cells.
-fn components(plan: &Plan, marked: &[bool]) -> Vec<Vec<usize>> {
+pub(crate) fn components(plan: &Plan, marked: &[bool]) -> Vec<Vec<usize>> {
     let mut seen = vec![false; marked.len()];
     let mut parts = Vec::new();
     for start in 0..marked.len() {

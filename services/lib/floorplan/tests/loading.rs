@@ -136,3 +136,71 @@ fn a_pad_must_stand_in_free_space() {
     assert!(text(5.25, 1.25).contains("in unknown space"));
     assert!(text(0.7, 1.5).contains("is 0.20 m from a wall, needed is 0.50 m"), "{}", text(0.7, 1.5));
 }
+
+/// The middle row of a picture of three rows, as a PNG of any depth.
+fn png(row: image::DynamicImage) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    row.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+fn middle_row(plan: &Plan) -> Vec<Cell> {
+    (0..plan.width()).map(|ix| plan.cell(ix, 1)).collect()
+}
+
+#[test]
+fn transparent_cells_are_unknown_in_scale_mode_and_shades_in_trinary() {
+    // Black, white and grey, opaque; white and black, transparent.
+    let row = [[0, 255], [254, 255], [205, 255], [254, 0], [0, 254]];
+    let cells: Vec<u8> = [row, row, row].concat().concat();
+    let picture = image::GrayAlphaImage::from_raw(5, 3, cells).unwrap();
+    let bytes = png(image::DynamicImage::ImageLumaA8(picture));
+    let scale = load(&format!("{HEADER}mode: scale\n"), &bytes).unwrap();
+    assert_eq!(middle_row(&scale), [Cell::Occupied, Cell::Free, Cell::Unknown, Cell::Unknown, Cell::Unknown]);
+    let trinary = load(HEADER, &bytes).unwrap();
+    assert_eq!(middle_row(&trinary), [Cell::Occupied, Cell::Free, Cell::Unknown, Cell::Free, Cell::Occupied]);
+}
+
+#[test]
+fn a_picture_of_sixteen_bits_is_the_same_plan_and_no_percents() {
+    let row = [0_u16, 254 * 257, 205 * 257, 65_535];
+    let picture =
+        image::ImageBuffer::<image::Luma<u16>, _>::from_raw(4, 3, [row, row, row].concat()).unwrap();
+    let bytes = png(image::DynamicImage::ImageLuma16(picture));
+    let plan = load(HEADER, &bytes).unwrap();
+    assert_eq!(middle_row(&plan), [Cell::Occupied, Cell::Free, Cell::Unknown, Cell::Free]);
+    let said = sentence(load(&format!("{HEADER}mode: raw\n"), &bytes));
+    assert!(
+        said.contains("`mode` is raw with a 16-bit picture, allowed is raw with an 8-bit picture"),
+        "{said}"
+    );
+}
+
+#[test]
+fn colours_and_other_white_points_are_read() {
+    let row = [[0, 0, 0], [254, 254, 254], [205, 205, 205]];
+    let picture = image::RgbImage::from_raw(3, 3, [row, row, row].concat().concat()).unwrap();
+    let plan = load(HEADER, &png(image::DynamicImage::ImageRgb8(picture))).unwrap();
+    assert_eq!(middle_row(&plan), [Cell::Occupied, Cell::Free, Cell::Unknown]);
+    // A PGM may say that 100 is white, or 1000 in two bytes.
+    let hundred = [&b"P5\n3 3\n100\n"[..], &[0, 100, 80].repeat(3)].concat();
+    assert_eq!(middle_row(&load(HEADER, &hundred).unwrap()), [Cell::Occupied, Cell::Free, Cell::Unknown]);
+    let thousand = [&b"P5\n3 3\n1000\n"[..], &[0, 0, 3, 232, 3, 32].repeat(3)].concat();
+    assert_eq!(middle_row(&load(HEADER, &thousand).unwrap()), [Cell::Occupied, Cell::Free, Cell::Unknown]);
+}
+
+#[test]
+fn thresholds_are_the_headers() {
+    let shades = [0, 100, 150, 200, 254].repeat(3);
+    let at = |occupied: f64, free: f64| {
+        let yaml = HEADER
+            .replace("occupied_thresh: 0.65", &format!("occupied_thresh: {occupied}"))
+            .replace("free_thresh: 0.196", &format!("free_thresh: {free}"));
+        middle_row(&load(&yaml, &pgm(5, &shades)).unwrap())
+    };
+    use Cell::{Free, Occupied, Unknown};
+    // Occupancies 1, 0.61, 0.41, 0.22 and 0.004.
+    assert_eq!(at(0.65, 0.196), [Occupied, Unknown, Unknown, Unknown, Free]);
+    assert_eq!(at(0.6, 0.25), [Occupied, Occupied, Unknown, Free, Free]);
+    assert_eq!(at(0.4, 0.3), [Occupied, Occupied, Occupied, Free, Free]);
+}

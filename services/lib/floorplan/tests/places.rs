@@ -1,7 +1,7 @@
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 //! Distances, rooms and sidecar files.
 
-use floorplan::{Area, Cell, DistanceField, Plan, Rooms, Sidecar};
+use floorplan::{Area, Cell, DistanceField, Plan, Rooms, Sidecar, widest_place};
 use proptest::prelude::*;
 
 /// Two rooms joined by a door of 0.8 m, at 0.2 m a cell.
@@ -125,4 +125,50 @@ fn a_wrong_sidecar_is_refused_in_one_sentence() {
         assert!(text.starts_with("a.rooms.yaml: ") && text.contains(expected), "{to}: {text}");
         assert_eq!(text.lines().count(), 1, "{text}");
     }
+}
+
+#[test]
+fn the_widest_place_lies_in_the_largest_part_that_can_be_flown_in() {
+    // A yard on the left that is wider but cut off by a gap of one cell, two rooms with a door on the right.
+    let rows = [
+        "#############################################",
+        "#             #                  #          #",
+        "#             #                  #          #",
+        "#             #                             #",
+        "#                                           #",
+        "#             #                             #",
+        "#             #                  #          #",
+        "#             #                  #          #",
+        "#             #####################       ###",
+        "#             #                             #",
+        "#             #                             #",
+        "#             #                             #",
+        "#             #                             #",
+        "#             #                             #",
+        "#############################################",
+    ];
+    let plan = Plan::from_ascii(&rows, 0.3);
+    let pad = widest_place(&plan, 0.2).unwrap();
+    let field = DistanceField::of_not_free(&plan, 5.0);
+    assert!(pad.x > 15.0 * 0.3, "in the part of the two rooms, not in the yard: {pad:?}");
+    let widest = (15..45)
+        .flat_map(|ix| (0..15).map(move |iy| (ix, iy)))
+        .map(|(ix, iy)| field.at_cell(ix, iy))
+        .fold(0.0, f32::max);
+    assert!((field.distance(pad.x, pad.y) - widest).abs() < 1e-4, "{pad:?}: {widest}");
+    // Of equal places the lowest, then the leftmost: the answer does not depend on who asks.
+    for (ix, iy) in (15..45).flat_map(|ix| (0..15).map(move |iy| (ix, iy))) {
+        let (x, y) = plan.centre(ix, iy);
+        let equal = field.at_cell(ix, iy) >= widest - 1e-6;
+        assert!(
+            !equal || y > pad.y - 1e-4 && (y > pad.y + 1e-4 || x > pad.x - 1e-4),
+            "({x}, {y}) before {pad:?}"
+        );
+    }
+    assert_eq!(widest_place(&plan, 3.0), None, "a giant fits nowhere");
+    // In an endless hall every place is wide enough: not its middle, out of earshot of the walls.
+    let hall = vec![" ".repeat(300); 300];
+    let rows: Vec<&str> = hall.iter().map(String::as_str).collect();
+    let plan = Plan::from_ascii(&rows, 0.1);
+    assert!(widest_place(&plan, 0.2).is_some());
 }

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 /// What the system as a whole is given.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct System {
     /// Name of the drone, as in `sereno/<name>/telemetry/...`.
     pub name: String,
@@ -18,6 +18,9 @@ pub struct System {
     pub world: String,
     /// No real device may be opened.
     pub simulated: bool,
+    /// Where the drone starts and lands, before what the plan's side file says: x and y in the plan frame, metres, and
+    /// the heading, degrees counter-clockwise from plan x.
+    pub pad: Option<[f32; 3]>,
 }
 
 /// What a failure of a service means, and with it the order of start: the most critical first.

@@ -24,6 +24,7 @@ struct RawSystem {
     vehicle: Option<String>,
     world: Option<String>,
     simulated: Option<bool>,
+    pad: Option<[f32; 3]>,
 }
 
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
@@ -64,6 +65,9 @@ struct RawTool {
     scorer: Option<bool>,
 }
 
+/// Farthest coordinate of a pad, metres, as in a plan's side file.
+const PAD_M: f64 = 10_000.0;
+
 fn over<T>(below: &mut Option<T>, above: Option<T>) {
     if above.is_some() {
         *below = above;
@@ -85,6 +89,7 @@ impl RawManifest {
         over(&mut self.system.vehicle, above.system.vehicle);
         over(&mut self.system.world, above.system.world);
         over(&mut self.system.simulated, above.system.simulated);
+        over(&mut self.system.pad, above.system.pad);
         for (name, service) in above.service {
             self.service.entry(name).or_default().merge(service);
         }
@@ -103,7 +108,13 @@ impl RawManifest {
             vehicle: source.required("system.vehicle", self.system.vehicle.clone(), "a vehicle file")?,
             world: self.system.world.clone().unwrap_or_default(),
             simulated: self.system.simulated.unwrap_or(false),
+            pad: self.system.pad,
         };
+        if let Some([x, y, degrees]) = system.pad {
+            source.real("system.pad: x", x.into(), -PAD_M, PAD_M)?;
+            source.real("system.pad: y", y.into(), -PAD_M, PAD_M)?;
+            source.real("system.pad: heading", degrees.into(), -360.0, 360.0)?;
+        }
         source.name("system.name", &system.name)?;
         for (field, path) in [
             ("system.plan", &system.plan),

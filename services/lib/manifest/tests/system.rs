@@ -267,3 +267,17 @@ proptest::proptest! {
         }
     }
 }
+
+#[test]
+fn a_pad_is_a_place_and_a_heading() {
+    let with = |pad: &str| {
+        Manifest::parse("m.toml", &SMALL.replace("name = \"s\"", &format!("name = \"s\"\n{pad}")))
+    };
+    assert_eq!(with("").unwrap().system.pad, None);
+    assert_eq!(with("pad = [1.5, -2.0, 90.0]").unwrap().system.pad, Some([1.5, -2.0, 90.0]));
+    let said = |pad: &str| with(pad).unwrap_err().to_string();
+    assert!(said("pad = [1.0, 99999.0, 0.0]").contains("system.pad: y = 99999: allowed is -10000 to 10000"));
+    assert!(said("pad = [1.0, nan, 0.0]").contains("system.pad: y = NaN"));
+    assert!(said("pad = [1.0, 2.0, 400.0]").contains("system.pad: heading = 400: allowed is -360 to 360"));
+    assert!(said("pad = [1.0, 2.0]").starts_with("m.toml:"), "{}", said("pad = [1.0, 2.0]"));
+}

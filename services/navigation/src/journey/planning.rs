@@ -102,6 +102,7 @@ impl Journey {
                 };
                 self.stops.clear();
                 self.stops.extend(round.stops().iter().filter(wanted));
+                self.looked &= !self.stops.iter().any(|stop| stop.look);
                 if !self.stops.iter().any(|stop| stop.look) && self.forgive() {
                     self.stage = Stage::Asked;
                     return Work::Busy;

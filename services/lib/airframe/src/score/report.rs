@@ -97,6 +97,10 @@ pub struct FlightReport {
     pub skipped: Vec<String>,
     /// Distance between the place of the end and the pad's centre, metres.
     pub off_pad_m: f64,
+    /// Seconds that the world stood still for, because the machine stalled: 0 in every rehearsal.
+    pub stalled_s: f64,
+    /// Hash (FNV-1a, 64 bits, hexadecimal) over every truth and every pose of the flight: equal for equal flights.
+    pub digest: String,
 }
 
 /// Coverage over flights.
@@ -135,6 +139,8 @@ pub struct Report {
     pub flights: Vec<FlightReport>,
     /// All together.
     pub total: Totals,
+    /// What a reader of the figures must know of the building: where the pad was put and why, what is not known.
+    pub remarks: Vec<String>,
 }
 
 impl Report {
@@ -155,7 +161,7 @@ impl Report {
             min_clearance_m: if nearest.is_finite() { nearest } else { 0.0 },
             real_time_factor,
         };
-        Self { flights: reports, total }
+        Self { flights: reports, total, remarks: Vec::new() }
     }
 }
 
