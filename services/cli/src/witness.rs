@@ -106,10 +106,10 @@ impl Witness {
     /// When the manifest does not allow it.
     pub fn open(ports: &mut Ports, world: &World, body: Body) -> Result<Self, StartError> {
         Ok(Self {
-            truth: ports.input(16)?,
-            pose: ports.input(16)?,
-            pilot: ports.input(16)?,
-            patrol: ports.input(2)?,
+            truth: ports.input()?,
+            pose: ports.input()?,
+            pilot: ports.input()?,
+            patrol: ports.input()?,
             recent: VecDeque::with_capacity(TRUTH_KEPT),
             last_truth: None,
             last_pose: None,
@@ -150,148 +150,6 @@ impl Witness {
             let then = self.last_pose.and_then(|pose| self.truth_at(pose.estimated_ns));
             let estimate = self.last_pose.map(|pose| carried_on(&pose, then.as_ref(), &truth));
             self.observe(world, &truth, estimate);
-        }
-        while let Some(state) = self.pilot.receive() {
-            self.pilot_said = Some((state.command_sequence, state.text.as_str().to_owned()));
-        }
-        let (taken, text) = self.pilot_said.as_ref()?;
-        (*taken == number).then(|| text.clone())
-    }
-}
-
-/// Truth kept while estimates for its times may still come: 1.3 s at 50 Hz.
-const TRUTH_KEPT: usize = 64;
-/// An estimate older than this stands still for its readers while the drone moves on: five poses of 20 Hz are missing.
-const FRESH_NS: u64 = 250_000_000;
-/// A later start of the world's clock than this is a stall: steps are whole milliseconds, and what a stall skips is 200 ms
-/// or more.
-const STALL_S: f64 = 0.05;
-
-/// Everything that is seen of one flight.
-pub struct Witness {
-    truth: Input<Truth>,
-    pose: Input<Pose>,
-    pilot: Input<PilotState>,
-    patrol: Input<Patrol>,
-    recent: VecDeque<Truth>,
-    /// The newest truth.
-    pub last_truth: Option<Truth>,
-    /// The newest pose.
-    pub last_pose: Option<Pose>,
-    /// The newest state of the pilot.
-    pub last_pilot: Option<PilotState>,
-    /// What the round says of itself.
-    pub round: Round,
-    /// Paths and close calls, for the picture.
-    pub track: Track,
-    body: Body,
-    scorer: Scorer,
-    failsafes: Vec<String>,
-    flown: bool,
-    last_track_s: f64,
-    stalls: Stalls,
-    digest: u64,
-}
-
-/// How long the world stood still: its clock starts later on the machine's clock after every stall.
-#[derive(Debug, Clone, Copy, Default)]
-struct Stalls {
-    /// Where the world's clock started on the machine's clock, seconds, as the newest truth has it.
-    start_s: Option<f64>,
-    total_s: f64,
-}
-
-impl Stalls {
-    fn follow(&mut self, truth: &Truth) {
-        let start_s = truth.header.stamp_ns as f64 * 1e-9 - truth.time_s;
-        let late_s = self.start_s.map_or(0.0, |before| start_s - before);
-        if self.start_s.is_none() || late_s > STALL_S {
-            self.start_s = Some(start_s);
-            self.total_s += late_s;
-        }
-    }
-}
-
-/// Where an estimate is by now: while it is fresh it moves with the truth since its time, so that its error is that of its
-/// own time; later it stands still.
-fn carried_on(pose: &Pose, then: Option<&Truth>, now: &Truth) -> (f32, f32, f32) {
-    let estimate = (pose.x_m, pose.y_m, pose.heading_rad);
-    match then {
-        Some(then) if now.header.stamp_ns.saturating_sub(pose.estimated_ns) <= FRESH_NS => (
-            estimate.0 + now.x_m - then.x_m,
-            estimate.1 + now.y_m - then.y_m,
-            estimate.2 + now.yaw_rad - then.yaw_rad,
-        ),
-        _ => estimate,
-    }
-}
-
-/// FNV-1a, 64 bits (Fowler, Noll, Vo), carried on over `bytes`.
-fn digested(digest: u64, bytes: &[u8]) -> u64 {
-    bytes.iter().fold(digest, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3))
-}
-
-/// What the round says of itself.
-#[derive(Debug, Clone, Default)]
-pub struct Round {
-    /// How it is going.
-    pub state: Option<PatrolState>,
-    /// Share seen, by the drone's own account.
-    pub coverage: f32,
-    /// Next waypoint and how many there are.
-    pub next: (u32, u32),
-    /// One sentence.
-    pub text: String,
-    /// Rooms that were left out, with reasons.
-    pub skipped: Vec<String>,
-}
-
-impl Witness {
-    /// Opens the ports of a scorer.
-    ///
-    /// # Errors
-    /// When the manifest does not allow it.
-    pub fn open(ports: &mut Ports, world: &World, body: Body) -> Result<Self, StartError> {
-        Ok(Self {
-            truth: ports.input()?,
-            pose: ports.input()?,
-            pilot: ports.input()?,
-            patrol: ports.input()?,
-            recent: VecDeque::with_capacity(TRUTH_KEPT),
-            last_truth: None,
-            last_pose: None,
-            last_pilot: None,
-            round: Round::default(),
-            track: Track::default(),
-            scorer: Scorer::new(world, body.radius_m),
-            body,
-            failsafes: Vec::new(),
-            flown: false,
-            last_track_s: f64::NEG_INFINITY,
-            stalls: Stalls::default(),
-            digest: 0xcbf2_9ce4_8422_2325,
-        })
-    }
-
-    /// Takes what has come; to be called at least 20 times a second of the flight.
-    pub fn look(&mut self, world: &World) {
-        while let Some(truth) = self.truth.receive() {
-            if self.recent.len() == TRUTH_KEPT {
-                self.recent.pop_front();
-            }
-            self.recent.push_back(*truth);
-            self.last_truth = Some(*truth);
-            self.flown |= truth.armed != 0 && truth.on_ground == 0;
-            if self.last_pose.is_none() {
-                self.observe(world, &truth, None);
-            }
-        }
-        while let Some(pose) = self.pose.receive() {
-            self.last_pose = Some(*pose);
-            // The estimate is compared with the truth of the time that it was made for.
-            if let Some(truth) = self.truth_at(pose.estimated_ns) {
-                self.observe(world, &truth, Some((pose.x_m, pose.y_m, pose.heading_rad)));
-            }
         }
         while let Some(state) = self.pilot.receive() {
             self.note_failsafe(&state);
