@@ -30,7 +30,7 @@ fn flown(vehicle: &str) -> Flown {
     let config: PilotConfig = parse_config("pilot.toml", &text).unwrap();
     let mut shield = Shield::new(config.shield, craft.radius_m, craft.sides.iter().copied());
     shield.set_sweep(0.18);
-    let group = |index: usize| u32::from(start.vehicle.sonars[index].group);
+    let group = |index: usize| start.vehicle.sonars[index].group;
     let sonars = craft.sides.iter().map(|(index, axis, _)| (*index, *axis, group(*index))).collect();
     Flown { shield, sonars, gap_m_s: config.shield.gap_m_s, half: config.shield.cone_half_angle_deg }
 }

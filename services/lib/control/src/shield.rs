@@ -322,7 +322,7 @@ impl Shield {
     fn sight(&self, now: u64, bearing: f32) -> Sight {
         let ring = self.sensors.iter().flatten().map(|s| (s.bearing, self.fresh(s, now).is_some()));
         let (cone, look) = (self.config.cone_half_angle_deg, self.config.look_half_angle_deg);
-        sight(ring, bearing, cone.to_radians(), look.to_radians())
+        sight(&ring, bearing, cone.to_radians(), look.to_radians())
     }
 
     /// The speed that may be flown in a direction (unit vector, plan frame).

@@ -21,7 +21,7 @@ pub(crate) enum Sight {
 /// What `bearing` is for a ring of sonars: azimuth of each axis, and whether it answers. `cone` and `look` are the
 /// half-angles of a cone and of what a sonar with an answering neighbour on that side joins to it, radians.
 pub(crate) fn sight(
-    ring: impl Iterator<Item = (f32, bool)> + Clone,
+    ring: &(impl Iterator<Item = (f32, bool)> + Clone),
     bearing: f32,
     cone: f32,
     look: f32,
@@ -104,7 +104,7 @@ mod tests {
 
     fn at(ring: &[(f32, bool)], degrees: f32) -> Sight {
         let ring = ring.iter().map(|(axis, answers)| (axis.to_radians(), *answers));
-        sight(ring, degrees.to_radians(), CONE.to_radians(), LOOK.to_radians())
+        sight(&ring, degrees.to_radians(), CONE.to_radians(), LOOK.to_radians())
     }
 
     #[test]
