@@ -44,6 +44,46 @@ fn it_takes_off_stands_and_lands() {
     }
 }
 
+/// Three metres from the pad it holds, and the charge runs out of what the way home takes: 0.23 leaves half a minute.
+/// And with 0.15 it does in the take-off already.
+#[test]
+fn a_hover_with_little_charge_comes_home_and_lands_on_the_pad() {
+    for (charge, aside) in [(0.23, true), (0.15, false)] {
+        let mut setup = setup("none");
+        setup.simulator.charge = charge;
+        let mut flight = Flight::start(&setup, 1).unwrap();
+        flight.run_for(6.0);
+        let pad = flight.world.pad();
+        flight.order(Verb::TakeOff, f32::NAN, f32::NAN);
+        let off = |flight: &Flight| {
+            let truth = flight.witness.last_truth.unwrap();
+            (truth.x_m - pad.x).hypot(truth.y_m - pad.y)
+        };
+        if aside {
+            flight.run_for(8.0);
+            flight.order(Verb::GoTo, pad.x + 3.0, pad.y);
+            flight.run_for(9.0);
+            flight.order(Verb::Hold, f32::NAN, f32::NAN);
+            flight.run_for(2.0);
+            assert_eq!(flight.witness.phase(), "hover");
+            assert!(off(&flight) > 2.0, "{} m from the pad", off(&flight));
+        }
+        let since = flight.bus.now();
+        while !flight.witness.landed() {
+            flight.run_for(0.5);
+            let waited = (flight.bus.now() - since) as f64 * 1e-9;
+            assert!(
+                waited < 90.0,
+                "charge {charge}: {}, {} m from the pad",
+                flight.witness.phase(),
+                off(&flight)
+            );
+        }
+        assert_eq!(flight.witness.contacts(), 0);
+        assert!(off(&flight) < 0.35, "charge {charge}: landed {} m from the pad's middle", off(&flight));
+    }
+}
+
 /// Half a minute of a round in a cluttered building, twice, while somebody else watches, and with another seed.
 #[test]
 fn the_same_seed_is_the_same_flight_byte_for_byte() {

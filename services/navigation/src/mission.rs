@@ -71,6 +71,8 @@ pub struct Mission {
     hold: Option<(f32, f32)>,
     phase: Phase,
     failsafe: FailsafeAction,
+    /// Whether the failsafe that sends home has been answered.
+    sent_home: bool,
     flew: bool,
     still_s: f32,
     over_pad_s: f32,
@@ -89,6 +91,7 @@ impl Mission {
             hold: None,
             phase: Phase::Grounded,
             failsafe: FailsafeAction::None,
+            sent_home: false,
             flew: false,
             still_s: 0.0,
             over_pad_s: 0.0,
@@ -260,8 +263,8 @@ impl Mission {
         let action = FailsafeAction::from_code(pilot.action).ok_or(Nonsense)?;
         let here = place.map(|place| (place.x, place.y));
         self.phase = phase;
-        let new_failsafe = action != self.failsafe;
         self.failsafe = action;
+        self.sent_home &= action == FailsafeAction::Return;
         if self.airborne() {
             self.flew = true;
         }
@@ -293,7 +296,11 @@ impl Mission {
             _ => {}
         }
         let homeward = matches!(self.state, PatrolState::Returning | PatrolState::Landing);
-        if action == FailsafeAction::Return && new_failsafe && self.airborne() && !homeward {
+        // It may have begun during the take-off, and no later order takes it back; a way home that was looked for in
+        // vain is not looked for five times a second.
+        let looked_in_vain = self.sent_home && self.state == PatrolState::Failed;
+        if action == FailsafeAction::Return && self.airborne() && !homeward && !looked_in_vain {
+            self.sent_home = true;
             self.head(Goal::Home, PatrolState::Returning, here);
             return Ok(Some(Event::Plan));
         }

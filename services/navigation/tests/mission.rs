@@ -159,6 +159,26 @@ fn failsafes_send_home_hold_or_end_the_round() {
 }
 
 #[test]
+fn what_sends_home_is_answered_whenever_it_began_and_whatever_is_ordered() {
+    // It began in the take-off of a plain hover: navigation had nothing to do with that.
+    let mut story = Story::new();
+    story.order(Verb::TakeOff).unwrap();
+    assert_eq!(story.pilot(Phase::TakeOff, FailsafeAction::Return), None);
+    assert_eq!(story.pilot(Phase::Autonomous, FailsafeAction::Return), Some(Event::Plan));
+    assert_eq!((story.mission.goal(), story.mission.state()), (Goal::Home, PatrolState::Returning));
+    for verb in [Verb::Hold, Verb::PatrolPause, Verb::PatrolStart] {
+        story.order(verb).unwrap();
+        story.pilot(Phase::Autonomous, FailsafeAction::Return);
+        assert_eq!(story.mission.goal(), Goal::Home, "after {verb:?}");
+    }
+    // No way home: it is not planned again with every message, but when it is asked for anew.
+    story.mission.no_way(Some(&place(3.0, 3.0)));
+    assert_eq!(story.pilot(Phase::Autonomous, FailsafeAction::Return), None);
+    assert_eq!(story.pilot(Phase::Autonomous, FailsafeAction::None), None);
+    assert_eq!(story.pilot(Phase::Hover, FailsafeAction::Return), Some(Event::Plan));
+}
+
+#[test]
 fn a_take_off_that_never_comes_ends_the_mission() {
     let mut story = Story::new();
     story.order(Verb::PatrolStart).unwrap();

@@ -2,7 +2,7 @@
 
 use crate::core::PilotCore;
 use crate::senses::age_s;
-use control::SpoolUp;
+use control::{Action, SpoolUp};
 use core::fmt::Write;
 use ipc_types::{Answer, Command, LinkState, Phase, PilotState, Text, Verb};
 
@@ -74,8 +74,13 @@ impl PilotCore {
     }
 
     fn obey(&mut self, now: u64, verb: Verb) -> Ruling {
+        let returning = self.airborne() && self.judged.action == Action::Return;
         match (verb, self.phase) {
             (_, Phase::Cut) => refused("refused: the motors were cut"),
+            // The table's answer is more severe than these wishes; to come down at once remains free.
+            (Verb::Hold | Verb::GoTo | Verb::PatrolStart | Verb::PatrolPause, _) if returning => {
+                refused("refused: returning home, the battery does not last for more")
+            }
             (Verb::TakeOff, Phase::Grounded) => self.try_take_off(now, Phase::Hover),
             (
                 Verb::TakeOff,
@@ -158,7 +163,7 @@ impl PilotCore {
 
     /// Writes why a take-off is refused; false when nothing stands in the way.
     fn why_not(&self, now: u64, out: &mut Text<96>) -> bool {
-        let cell = self.flight.cell_volts;
+        let cell = self.cell_volts(now).unwrap_or(f32::NAN);
         let silent = self.shield.silent_for(now, SIDES_S);
         let policy = &self.config.failsafe;
         // A sentence that does not fit is cut; its beginning says what matters.
@@ -172,6 +177,10 @@ impl PilotCore {
             write!(out, "refused: {}", self.flight.reason)
         } else if age_s(self.attitude.at, now) > 0.5 {
             out.write_str("refused: the controller sends no attitude")
+        } else if cell.is_nan() {
+            out.write_str("refused: the controller does not tell the battery's voltage")
+        } else if !self.flight.drawn_mah.is_finite() {
+            out.write_str("refused: the controller does not tell the charge drawn from the battery")
         } else if cell < self.config.take_off.cell_volts {
             write!(
                 out,

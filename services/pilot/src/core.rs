@@ -10,6 +10,7 @@ use control::{
 };
 use floorplan::{DistanceField, Plan};
 use ipc_types::{ChannelSource, Phase, Text};
+use runtime::Start;
 use std::sync::Arc;
 
 /// What the pilot must know about the aircraft.
@@ -37,6 +38,38 @@ pub struct Craft {
     pub max_tilt_rad: f32,
 }
 
+impl Craft {
+    /// What the pilot needs of the vehicle.
+    #[must_use]
+    pub fn of(start: &Start) -> Self {
+        let v = &start.vehicle;
+        let down = v.sonars.iter().find(|sonar| sonar.looks_down());
+        // Thrust goes with the square of the command, which runs from idle to full as the throttle from 1000 to 2000.
+        let load = v.body.mass_kg * control::GRAVITY_M_S2 / (4.0 * v.motors.max_thrust_n);
+        let idle = v.motors.idle_fraction.clamp(0.0, 0.3);
+        let share = (load.clamp(0.02, 0.9).sqrt() - idle) / (1.0 - idle);
+        Self {
+            radius_m: v.body.radius_m,
+            sides: v
+                .sonars
+                .iter()
+                .enumerate()
+                .filter(|(_, sonar)| !sonar.looks_down())
+                .map(|(index, sonar)| (index, sonar.bearing_rad, Vector::new(sonar.x_m, sonar.y_m)))
+                .collect(),
+            has_down: down.is_some(),
+            // The middle of the cylinder is half its height above the skids.
+            rest_m: down.map_or(0.0, |sonar| (0.5 * v.body.height_m + sonar.z_m).clamp(0.0, 0.3)),
+            beam_rest_m: 0.5 * v.body.height_m,
+            hover_us: 1000.0 + 1000.0 * share,
+            cells: v.battery.cells,
+            capacity_mah: v.battery.capacity_mah,
+            cruise_m_s: v.limits.cruise_m_s,
+            max_tilt_rad: v.limits.max_tilt_rad,
+        }
+    }
+}
+
 /// The level that the controller's attitude showed on the ground, averaged.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GroundLevel {
@@ -53,6 +86,7 @@ pub(crate) struct Timers {
     pub(crate) pose: Held,
     pub(crate) walls: Held,
     pub(crate) home: Held,
+    pub(crate) charge: Held,
     pub(crate) low: Held,
     pub(crate) empty: Held,
     pub(crate) link: Held,
@@ -70,6 +104,8 @@ pub(crate) struct Decided {
     pub(crate) throttle_us: f32,
     pub(crate) yaw_us: f32,
     pub(crate) shield_speed_m_s: f32,
+    /// Expiry of the wish that was flown; the far future when it is the pilot's own.
+    pub(crate) expiry_ns: u64,
 }
 
 impl Decided {
@@ -81,6 +117,7 @@ impl Decided {
         throttle_us: 1000.0,
         yaw_us: 1500.0,
         shield_speed_m_s: 0.0,
+        expiry_ns: u64::MAX,
     };
 }
 
@@ -91,6 +128,8 @@ pub struct PilotCore {
     pub(crate) craft: Craft,
     pub(crate) walls: Option<Arc<DistanceField>>,
     pub(crate) way_home: Option<WayHome>,
+    /// Length of the way home from where the place was known last, metres.
+    pub(crate) home_m: Option<f32>,
 
     pub(crate) attitude: AttitudeSeen,
     pub(crate) pose: PoseSeen,
@@ -148,6 +187,7 @@ impl PilotCore {
         Self {
             walls: plan.map(|(_, walls)| walls),
             way_home,
+            home_m: None,
             attitude: AttitudeSeen::default(),
             pose: PoseSeen::default(),
             flight: FlightSeen::default(),

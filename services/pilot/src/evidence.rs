@@ -36,11 +36,11 @@ impl PilotCore {
     /// For how long what has been so.
     pub(crate) fn evidence(&mut self, now: u64) -> Evidence {
         let policy = self.config.failsafe;
-        let fresh_setpoint = self.setpoint.is_some_and(|setpoint| now < setpoint.expiry_ns);
+        let fresh_setpoint = self.fresh_setpoint(now).is_some();
         let (silent, sides) = self.shield.silent(now);
         let place_known = self.place_known();
-        let cell = self.flight.cell_volts;
-        let uncovered = self.home_uncovered();
+        let cell = self.cell_volts(now);
+        let uncovered = self.home_uncovered(now);
         let link = age_s(self.flight.at, now) > 1.0 || self.flight.link != LinkState::Up;
         let tilted = self.tilt().magnitude() > policy.tilt_deg.to_radians();
         let adrift = self.pose.adrift.filter(|_| !place_known);
@@ -58,9 +58,14 @@ impl PilotCore {
             pose_uncertain_s: t.pose.update(now, !place_known, CLEAR_S),
             few_walls_s: t.walls.update(now, few_walls, CLEAR_S),
             adrift_s: adrift.map_or(0.0, |since| age_s(Some(since), now)),
-            home_uncovered_s: t.home.update(now, uncovered, CLEAR_VOLTS_S),
-            cell_low_s: t.low.update(now, cell < policy.return_volts, CLEAR_VOLTS_S),
-            cell_empty_s: t.empty.update(now, cell < policy.land_volts, CLEAR_S),
+            home_uncovered_s: t.home.update(now, uncovered == Some(true), CLEAR_VOLTS_S),
+            charge_unknown_s: t.charge.update(
+                now,
+                airborne && (uncovered.is_none() || cell.is_none()),
+                CLEAR_S,
+            ),
+            cell_low_s: t.low.update(now, cell.is_some_and(|v| v < policy.return_volts), CLEAR_VOLTS_S),
+            cell_empty_s: t.empty.update(now, cell.is_some_and(|v| v < policy.land_volts), CLEAR_S),
             height_silent_s: if airborne { self.height.silent_s(now) } else { 0.0 },
             link_silent_s: t.link.update(now, link, 0.2),
             tilt_s: t.tilt.update(now, tilted, 0.05),
@@ -68,19 +73,27 @@ impl PilotCore {
         }
     }
 
-    /// Whether the charge left does not cover the way home through the corridors and the reserve.
-    fn home_uncovered(&self) -> bool {
-        let Some(way) = &self.way_home else { return false };
-        let drawn = self.flight.drawn_mah;
-        if !drawn.is_finite() || !self.place_known() {
-            return false;
+    /// Volts a cell; `None` when the controller does not say, or last said so long ago that it means nothing now.
+    pub(crate) fn cell_volts(&self, now: u64) -> Option<f32> {
+        let fresh = age_s(self.flight.power_at, now) <= self.config.failsafe.power_stale_s;
+        Some(self.flight.cell_volts).filter(|volts| fresh && volts.is_finite())
+    }
+
+    /// Whether the charge left does not cover the way home through the corridors and the reserve; `None` when nobody
+    /// can tell. While the place is not known it is as far as it was last.
+    fn home_uncovered(&mut self, now: u64) -> Option<bool> {
+        if self.place_known() {
+            let here = self.motion.place();
+            self.home_m = self.way_home.as_ref().and_then(|way| way.length_m(here)).or(self.home_m);
         }
-        let Some(length) = way.length_m(self.motion.place()) else { return false };
+        let drawn = self.flight.drawn_mah;
+        let fresh = age_s(self.flight.power_at, now) <= self.config.failsafe.power_stale_s;
+        let length = self.home_m.filter(|_| fresh && drawn.is_finite())?;
         let measured = self.flight.amps > 0.5;
         let amps = if measured { self.flight.amps } else { self.craft.capacity_mah * 1e-3 / HOVER_HOURS };
         let seconds = length / (HOME_PACE * self.craft.cruise_m_s).max(0.05) + MEETING_S + LANDING_S;
         let needed = amps * 1000.0 * seconds / 3600.0 * (1.0 + self.config.failsafe.home_reserve);
-        USABLE * self.craft.capacity_mah - drawn < needed
+        Some(USABLE * self.craft.capacity_mah - drawn < needed)
     }
 
     /// What would happen if this were lost now.

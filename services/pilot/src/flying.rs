@@ -106,13 +106,15 @@ impl PilotCore {
         }
     }
 
-    /// The horizontal wish (plan frame) and whose it is.
-    fn wish(&mut self, now: u64) -> (Vector, Source) {
+    /// The horizontal wish (plan frame), whose it is, and when it expires.
+    fn wish(&mut self, now: u64) -> (Vector, Source, u64) {
         let setpoint = self.fresh_setpoint(now).filter(|_| self.phase == Phase::Autonomous);
         let asking = Asking { airborne: true, navigation: setpoint.is_some(), failsafe: self.judged.action };
         let source = arbitrate(&asking);
         let place = self.place_known();
+        let mut expiry_ns = u64::MAX;
         if let (Source::Navigation, Some(setpoint)) = (source, setpoint) {
+            expiry_ns = setpoint.expiry_ns;
             if let Some(heading) = setpoint.heading {
                 self.hold_heading = Some(heading);
             }
@@ -122,7 +124,7 @@ impl PilotCore {
             match (setpoint.kind, setpoint.hold) {
                 (SetpointKind::Velocity, _) => {
                     self.hold = None;
-                    return (setpoint.velocity, source);
+                    return (setpoint.velocity, source, expiry_ns);
                 }
                 (_, Some(hold)) => self.hold = Some(hold),
                 (_, None) => self.settle(),
@@ -142,7 +144,7 @@ impl PilotCore {
             Some(hold) if place => hold_velocity(&self.config.hold, hold, self.motion.place()),
             _ => Vector::ZERO,
         };
-        (wish, source)
+        (wish, source, expiry_ns)
     }
 
     /// Who stands and is not sure of its place turns to and fro: from the same heading it hears the same again.
@@ -160,7 +162,7 @@ impl PilotCore {
     }
 
     fn fly(&mut self, now: u64, dt: f32) -> Decided {
-        let (wish, source) = self.wish(now);
+        let (wish, source, expiry_ns) = self.wish(now);
         let clearance = self.height.clearance_m();
         let heading = self.heading();
         let guarded = self.shield.guard(
@@ -217,6 +219,7 @@ impl PilotCore {
             throttle_us,
             yaw_us: stick::of_yaw_rate(turn),
             shield_speed_m_s: guarded.allowed_m_s,
+            expiry_ns,
         }
     }
 

@@ -68,7 +68,10 @@ impl PilotCore {
             // What the interrupted take-off was for: navigation remembers its round.
             self.after_take_off = Phase::Autonomous;
         }
-        if known.is_some_and(|state| state != PatrolState::Idle) && pad.is_finite() {
+        // Without a round the pad is where the drone took off, which it knows better, unless it has forgotten.
+        let forgotten = self.airborne() && self.way_home.as_ref().is_some_and(|way| way.home().is_none());
+        let asked = known.is_some_and(|state| state != PatrolState::Idle);
+        if (asked || (known.is_some() && forgotten)) && pad.is_finite() {
             self.set_home(pad);
         }
     }

@@ -17,6 +17,10 @@ const CLIMB_S: f32 = 12.0;
 pub(crate) const BLIND_M_S: f32 = 0.35;
 const BLIND_MORE_S: f32 = 3.0;
 
+/// A setpoint that holds for less is used no more, nanoseconds: channels made from it would expire before the next ones,
+/// a tick of 20 ms later and as much late again, have reached the controller.
+const LEAST_LEFT_NS: u64 = 40_000_000;
+
 impl PilotCore {
     /// One transition at most a step.
     pub(crate) fn advance(&mut self, now: u64, dt: f32) {
@@ -43,8 +47,9 @@ impl PilotCore {
                 {
                     self.land(now, None);
                     self.enter(now, Phase::EmergencyLanding);
-                    self.say_failsafe();
+                    self.say_failsafe("emergency landing");
                 }
+                Action::Return => self.turn_home(now),
                 _ => {}
             }
         }
@@ -71,6 +76,19 @@ impl PilotCore {
         }
     }
 
+    /// Navigation knows the way home: whoever hovers follows it from now on, whoever takes off as soon as it is up,
+    /// where doors can be flown through.
+    fn turn_home(&mut self, now: u64) {
+        match self.phase {
+            Phase::Hover => {
+                self.enter(now, Phase::Autonomous);
+                self.say_failsafe("returning home");
+            }
+            Phase::TakeOff => self.after_take_off = Phase::Autonomous,
+            _ => {}
+        }
+    }
+
     fn arming(&mut self, now: u64) {
         if self.flight.armed {
             self.spool_up(now);
@@ -90,7 +108,11 @@ impl PilotCore {
             let there = (self.height.height_m() - self.config.height_m).abs() < THERE_M;
             if there || self.phase_s(now) > CLIMB_S {
                 self.enter(now, self.after_take_off);
-                self.say(if self.phase == Phase::Autonomous { "following navigation" } else { "hovering" });
+                match (self.phase, self.judged.action) {
+                    (Phase::Autonomous, Action::Return) => self.say_failsafe("returning home"),
+                    (Phase::Autonomous, _) => self.say("following navigation"),
+                    _ => self.say("hovering"),
+                }
             }
             return;
         };
@@ -170,13 +192,13 @@ impl PilotCore {
     }
 
     pub(crate) fn fresh_setpoint(&self, now: u64) -> Option<crate::senses::SetpointSeen> {
-        self.setpoint.filter(|setpoint| now < setpoint.expiry_ns)
+        self.setpoint.filter(|setpoint| now.saturating_add(LEAST_LEFT_NS) <= setpoint.expiry_ns)
     }
 
-    fn say_failsafe(&mut self) {
+    fn say_failsafe(&mut self, what: &str) {
         let mut sentence = Text::<96>::default();
         // What does not fit is cut.
-        let _ = write!(sentence, "emergency landing: {}", crate::report::cause(self.judged.cause));
+        let _ = write!(sentence, "{what}: {}", crate::report::cause(self.judged.cause));
         self.say(sentence.as_str());
     }
 }

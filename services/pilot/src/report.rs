@@ -54,7 +54,8 @@ impl PilotCore {
         us[3] = stick::channel(d.yaw_us, 1500);
         us[4] = if d.arm { 2000 } else { 1000 };
         us[5] = 2000;
-        out.expiry_ns = now.saturating_add(nanoseconds(f64::from(self.config.expiry_s)));
+        // Never later than the wish that they were made from.
+        out.expiry_ns = now.saturating_add(nanoseconds(f64::from(self.config.expiry_s))).min(d.expiry_ns);
         out.channels_us = us;
         out.count = CHANNELS as u16;
         out.source = d.source.code();

@@ -168,7 +168,7 @@ impl FlightSeen {
         self.power_at = Some(message.header.stamp_ns);
         self.cell_volts = message.volts / cells as f32;
         self.amps = message.amps;
-        self.drawn_mah = message.drawn_mah;
+        self.drawn_mah = Some(message.drawn_mah).filter(|drawn| *drawn >= 0.0).unwrap_or(f32::NAN);
         // A controller without a battery sensor says 0: that is "does not say", not "empty".
         if self.cell_volts < 1.0 || self.cell_volts > 6.0 {
             self.cell_volts = f32::NAN;

@@ -2,7 +2,6 @@
 
 use crate::config::PilotConfig;
 use crate::core::{Craft, PilotCore};
-use control::Vector;
 use floorplan::DistanceField;
 use ipc_types::{
     Attitude, Channels, Command, FlightState, FlowMotion, Patrol, PilotState, Pose, Power, Setpoint,
@@ -33,35 +32,6 @@ pub struct Pilot {
     said_ns: Option<u64>,
 }
 
-/// What the pilot needs of the vehicle.
-fn craft(start: &Start) -> Craft {
-    let v = &start.vehicle;
-    let down = v.sonars.iter().find(|sonar| sonar.looks_down());
-    // Thrust goes with the square of the command, which runs from idle to full as the throttle from 1000 to 2000.
-    let load = v.body.mass_kg * control::GRAVITY_M_S2 / (4.0 * v.motors.max_thrust_n);
-    let idle = v.motors.idle_fraction.clamp(0.0, 0.3);
-    let share = (load.clamp(0.02, 0.9).sqrt() - idle) / (1.0 - idle);
-    Craft {
-        radius_m: v.body.radius_m,
-        sides: v
-            .sonars
-            .iter()
-            .enumerate()
-            .filter(|(_, sonar)| !sonar.looks_down())
-            .map(|(index, sonar)| (index, sonar.bearing_rad, Vector::new(sonar.x_m, sonar.y_m)))
-            .collect(),
-        has_down: down.is_some(),
-        // The middle of the cylinder is half its height above the skids.
-        rest_m: down.map_or(0.0, |sonar| (0.5 * v.body.height_m + sonar.z_m).clamp(0.0, 0.3)),
-        beam_rest_m: 0.5 * v.body.height_m,
-        hover_us: 1000.0 + 1000.0 * share,
-        cells: v.battery.cells,
-        capacity_mah: v.battery.capacity_mah,
-        cruise_m_s: v.limits.cruise_m_s,
-        max_tilt_rad: v.limits.max_tilt_rad,
-    }
-}
-
 impl Service for Pilot {
     const NAME: &'static str = "pilot";
     type Config = PilotConfig;
@@ -70,7 +40,7 @@ impl Service for Pilot {
         let plan = start.plan()?;
         let walls = start.shared("pilot walls", || Ok(DistanceField::new(&plan, WALLS_M)))?;
         Ok(Self {
-            core: PilotCore::new(config, craft(start), Some((&plan, walls))),
+            core: PilotCore::new(config, Craft::of(start), Some((&plan, walls))),
             setpoint: ports.input()?,
             patrol: ports.input()?,
             pose: ports.input()?,

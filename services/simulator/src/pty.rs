@@ -221,7 +221,7 @@ mod tests {
         for _ in 0..300 {
             device.write(&[7; 32]).unwrap();
             // The kernel hands bytes from one end to the other in a thread of its own.
-            std::thread::sleep(std::time::Duration::from_millis(1));
+            std::thread::sleep(Duration::from_millis(1));
         }
         let mut kept = Vec::new();
         let _ = far_end(&path).read_to_end(&mut kept);

@@ -40,7 +40,7 @@ pub enum Cause {
     PoseUncertain = 3,
     /// All side sonars are silent.
     AllSonarsSilent = 4,
-    /// The way home is just covered, or a cell is low.
+    /// The way home is just covered, a cell is low, or nobody knows.
     BatteryReturn = 5,
     /// A cell is nearly empty.
     BatteryLand = 6,
@@ -85,6 +85,8 @@ pub struct Evidence {
     pub adrift_s: f32,
     /// What is left in the battery does not cover the way home and the reserve.
     pub home_uncovered_s: f32,
+    /// Nobody can tell what is left in the battery.
+    pub charge_unknown_s: f32,
     /// A cell is under the return voltage.
     pub cell_low_s: f32,
     /// A cell is under the landing voltage.
@@ -125,6 +127,10 @@ pub struct Policy {
     pub sonars_hover_s: f32,
     /// All side sonars silent: land.
     pub sonars_land_s: f32,
+    /// Age above which what was heard of the battery is stale.
+    pub power_stale_s: f32,
+    /// Charge unknown: return.
+    pub power_return_s: f32,
     /// Volts a cell under which to return.
     pub return_volts: f32,
     /// For how long under `return_volts`.
@@ -151,7 +157,9 @@ pub struct Policy {
 
 impl Default for Policy {
     /// DESIGN 4. Where it names no number: navigation, which restarts in well under a second, hovers at once
-    /// and lands after a minute; the controller's link hovers after 1 s and lands after 5 s.
+    /// and lands after a minute; the controller's link hovers after 1 s and lands after 5 s. The battery is told of
+    /// twice a second: four messages in a row are not lost by chance; a charge that nobody knows is given as long to
+    /// come back as a low cell.
     fn default() -> Self {
         Self {
             navigation_hover_s: 0.1,
@@ -165,6 +173,8 @@ impl Default for Policy {
             drift_land_s: 1.5,
             sonars_hover_s: 0.5,
             sonars_land_s: 5.0,
+            power_stale_s: 2.0,
+            power_return_s: 10.0,
             return_volts: 3.5,
             return_s: 10.0,
             land_volts: 3.3,
@@ -195,6 +205,8 @@ impl Policy {
         within("failsafe.drift_land_s", self.drift_land_s, 0.5, 60.0)?;
         within("failsafe.sonars_hover_s", self.sonars_hover_s, 0.1, 2.0)?;
         within("failsafe.sonars_land_s", self.sonars_land_s, 1.0, 30.0)?;
+        within("failsafe.power_stale_s", self.power_stale_s, 1.0, 10.0)?;
+        within("failsafe.power_return_s", self.power_return_s, 1.0, 60.0)?;
         within("failsafe.return_volts", self.return_volts, 3.2, 4.0)?;
         within("failsafe.return_s", self.return_s, 1.0, 60.0)?;
         within("failsafe.land_volts", self.land_volts, 3.0, self.return_volts)?;
@@ -237,7 +249,7 @@ pub struct Row {
 
 /// The table, with what `e` says about each row. Its order means nothing: the most severe wins.
 #[must_use]
-pub fn table(e: &Evidence, p: &Policy) -> [Row; 20] {
+pub fn table(e: &Evidence, p: &Policy) -> [Row; 21] {
     let navigation = if e.autonomous { e.navigation_silent_s } else { 0.0 };
     let row = |cause, lasted_s, after_s, action, what| Row { cause, after_s, lasted_s, action, what };
     let ordered = e.operator.unwrap_or(Action::None);
@@ -277,6 +289,7 @@ pub fn table(e: &Evidence, p: &Policy) -> [Row; 20] {
             Action::Return,
             "way home and reserve not covered",
         ),
+        row(Cause::BatteryReturn, e.charge_unknown_s, p.power_return_s, Action::Return, "charge unknown"),
         row(Cause::BatteryReturn, e.cell_low_s, p.return_s, Action::Return, "cell under the return voltage"),
         row(Cause::BatteryLand, e.cell_empty_s, p.land_s, Action::Land, "cell under the landing voltage"),
         row(Cause::HeightUnknown, e.height_silent_s, p.height_hold_s, Action::Hover, "down sonar silent"),

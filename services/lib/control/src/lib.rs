@@ -22,6 +22,7 @@ mod planar;
 mod position;
 mod remembered;
 mod shield;
+mod sight;
 pub mod stick;
 mod touchdown;
 mod velocity;

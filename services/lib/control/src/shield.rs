@@ -8,6 +8,7 @@ use crate::check::{RangeError, within};
 use crate::held::seconds;
 use crate::planar::{Vector, wrap_angle};
 use crate::remembered::Remembered;
+use crate::sight::{Glances, Sight, sight};
 use floorplan::DistanceField;
 
 /// Most sonars around.
@@ -30,8 +31,14 @@ pub struct ShieldConfig {
     pub push_gain_per_s: f32,
     /// Fastest push, m/s: more than what gusts of 0.2 m/s2 make the velocity loop miss.
     pub max_push_m_s: f32,
-    /// Half-angle of what a sonar can vouch for, degrees: 22.5 joins eight, the rest is its cone.
+    /// Half-angle to which a sonar and an answering neighbour join, degrees: 27.5 joins the flown layout at its widest.
+    /// Beyond the cone that is a gap; beside a sonar that does not answer the cone is all.
     pub look_half_angle_deg: f32,
+    /// Fastest way into a gap over which no cone has swept of late, m/s.
+    pub gap_m_s: f32,
+    /// A cone that swept over a gap vouches for it so long, seconds: the period of navigation's scan, and a sweep. What
+    /// was heard meanwhile is remembered for longer.
+    pub glance_s: f32,
     /// Half-angle of the cone in which an echo may lie, degrees (FACTS 2).
     pub cone_half_angle_deg: f32,
     /// Delay of the braking law beside the sweep, seconds (FACTS 2).
@@ -57,6 +64,8 @@ impl Default for ShieldConfig {
             push_gain_per_s: 0.8,
             max_push_m_s: 0.2,
             look_half_angle_deg: 28.0,
+            gap_m_s: 0.25,
+            glance_s: 1.6,
             cone_half_angle_deg: 15.0,
             reaction_s: 0.35,
             deceleration_m_s2: 2.0,
@@ -78,6 +87,8 @@ impl ShieldConfig {
         within("shield.push_gain_per_s", self.push_gain_per_s, 0.0, 2.0)?;
         within("shield.max_push_m_s", self.max_push_m_s, 0.0, 0.3)?;
         within("shield.look_half_angle_deg", self.look_half_angle_deg, 15.0, 45.0)?;
+        within("shield.gap_m_s", self.gap_m_s, 0.0, 0.5)?;
+        within("shield.glance_s", self.glance_s, 0.0, 4.0)?;
         within("shield.cone_half_angle_deg", self.cone_half_angle_deg, 5.0, 30.0)?;
         within("shield.reaction_s", self.reaction_s, 0.2, 1.0)?;
         within("shield.deceleration_m_s2", self.deceleration_m_s2, 0.5, 2.5)?;
@@ -146,6 +157,7 @@ pub struct Shield {
     radius_m: f32,
     sensors: [Option<Sensor>; MAX_SENSORS],
     remembered: Remembered,
+    glances: Glances,
     sweep_s: f32,
 }
 
@@ -174,7 +186,14 @@ impl Shield {
                 *slot = Some(Sensor { bearing, mount, look: None });
             }
         }
-        Self { config, radius_m, sensors, remembered: Remembered::new(), sweep_s: 0.24 }
+        Self {
+            config,
+            radius_m,
+            sensors,
+            remembered: Remembered::new(),
+            glances: Glances::new(),
+            sweep_s: 0.24,
+        }
     }
 
     /// Sets the period of a whole sweep through all sonars, seconds.
@@ -199,6 +218,8 @@ impl Shield {
             Some(Some(sensor)) if matches!(look.echo, Echo::Range(range) if within(sensor, range)) => sane,
             Some(Some(sensor)) if sane && look.heading.is_finite() => {
                 sensor.look = Some(look);
+                let cone = self.config.cone_half_angle_deg.to_radians();
+                self.glances.look(look.at_ns, sensor.bearing + look.heading, cone);
                 if let (Some(place), Echo::Range(range)) = (look.place.and_then(Vector::known), look.echo) {
                     let face = place + sensor.mount.rotated(look.heading);
                     self.remembered.hear(look.at_ns, place, face, sensor.bearing + look.heading, range);
@@ -297,36 +318,23 @@ impl Shield {
         FAR_M
     }
 
-    /// The nearest direction (body frame) that a healthy sonar watches, and how far off it is.
-    fn watched(&self, now: u64, bearing: f32) -> Option<(f32, f32)> {
-        let half = self.config.look_half_angle_deg.to_radians();
-        let mut best: Option<(f32, f32)> = None;
-        for sensor in self.sensors.iter().flatten() {
-            if self.fresh(sensor, now).is_none() {
-                continue;
-            }
-            let off = wrap_angle(bearing - sensor.bearing);
-            let beyond = off.abs() - half;
-            if beyond <= 0.0 {
-                return Some((bearing, 0.0));
-            }
-            if best.is_none_or(|(_, least)| beyond < least) {
-                // A hair inside, so that rounding does not put it outside again.
-                best = Some((sensor.bearing + half.copysign(off) * 0.999, beyond));
-            }
-        }
-        best
+    /// How well a direction (body frame) is watched now.
+    fn sight(&self, now: u64, bearing: f32) -> Sight {
+        let ring = self.sensors.iter().flatten().map(|s| (s.bearing, self.fresh(s, now).is_some()));
+        let (cone, look) = (self.config.cone_half_angle_deg, self.config.look_half_angle_deg);
+        sight(&ring, bearing, cone.to_radians(), look.to_radians())
     }
 
     /// The speed that may be flown in a direction (unit vector, plan frame).
     fn allowed(&self, now: u64, direction: Vector, footing: &Footing, walls: Option<&DistanceField>) -> f32 {
-        if self.watched(now, wrap_angle(direction.angle() - footing.heading)).is_none_or(|(_, off)| off > 0.0)
-        {
-            return 0.0;
-        }
         let c = &self.config;
+        let most = match self.sight(now, wrap_angle(direction.angle() - footing.heading)) {
+            Sight::Closed(_) => return 0.0,
+            Sight::Gap if self.glances.age_s(now, direction.angle()) > c.glance_s => c.gap_m_s,
+            Sight::Gap | Sight::Cone => f32::INFINITY,
+        };
         let braking = self.braking();
-        let speed = braking.speed(self.free_way(now, direction, footing.place));
+        let speed = braking.speed(self.free_way(now, direction, footing.place)).min(most);
         let (Some(walls), Some(place)) = (walls, footing.place) else { return speed };
         let sigma = if footing.sigma_m.is_finite() { footing.sigma_m.clamp(0.0, 0.08) } else { 0.08 };
         let soft = Self::plan_way(walls, place, direction, self.radius_m + c.plan_margin_m + sigma);
@@ -383,9 +391,9 @@ impl Shield {
         let speed = velocity.norm();
         if speed > 1e-4 {
             let bearing = wrap_angle(velocity.angle() - footing.heading);
-            velocity = match self.watched(now, bearing) {
-                Some((_, 0.0)) => velocity,
-                Some((edge, off)) if off < BEND_RAD => {
+            velocity = match self.sight(now, bearing) {
+                Sight::Cone | Sight::Gap => velocity,
+                Sight::Closed(Some((edge, off))) if off < BEND_RAD => {
                     Vector::along(edge + footing.heading) * (speed * off.cos())
                 }
                 _ => Vector::ZERO,

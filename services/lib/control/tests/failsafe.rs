@@ -31,6 +31,11 @@ fn the_numbers_of_the_design() {
     let sonars = |e: &mut Evidence, s| e.all_sonars_silent_s = s;
     assert_eq!(at(sonars, 0.51), (Cause::AllSonarsSilent, Action::Hover));
     assert_eq!(at(sonars, 5.1), (Cause::AllSonarsSilent, Action::Land));
+    let unknown = |e: &mut Evidence, s| e.charge_unknown_s = s;
+    assert_eq!(at(unknown, 9.9), (Cause::None, Action::None));
+    assert_eq!(at(unknown, 10.1), (Cause::BatteryReturn, Action::Return));
+    assert_eq!(at(|e, s| e.home_uncovered_s = s, 2.9), (Cause::None, Action::None));
+    assert_eq!(at(|e, s| e.home_uncovered_s = s, 3.1), (Cause::BatteryReturn, Action::Return));
     assert_eq!(at(|e, s| e.cell_low_s = s, 9.9), (Cause::None, Action::None));
     assert_eq!(at(|e, s| e.cell_low_s = s, 10.1), (Cause::BatteryReturn, Action::Return));
     assert_eq!(at(|e, s| e.cell_empty_s = s, 2.1), (Cause::BatteryLand, Action::Land));
@@ -41,14 +46,16 @@ fn the_numbers_of_the_design() {
 
 #[test]
 fn the_most_severe_of_any_set_of_causes_wins() {
-    // Every subset of twelve flags, each far beyond its times.
+    // Every subset of fourteen flags, each far beyond its times.
     let p = Policy::default();
     type Failure = (fn(&mut Evidence), Action);
-    let set: [Failure; 12] = [
+    let set: [Failure; 14] = [
         (|e| e.navigation_silent_s = 1.0, Action::Hover),
         (|e| e.side_sonar_silent_s = 9.0, Action::None),
         (|e| e.pose_uncertain_s = 2.0, Action::Hover),
         (|e| e.all_sonars_silent_s = 6.0, Action::Land),
+        (|e| e.home_uncovered_s = 4.0, Action::Return),
+        (|e| e.charge_unknown_s = 11.0, Action::Return),
         (|e| e.cell_low_s = 11.0, Action::Return),
         (|e| e.cell_empty_s = 3.0, Action::Land),
         (|e| e.few_walls_s = 6.0, Action::Descend),
@@ -83,7 +90,7 @@ fn navigation_matters_only_to_those_who_follow_it() {
 }
 
 fn evidence() -> impl Strategy<Value = Evidence> {
-    (proptest::collection::vec(prop_oneof![Just(0.0f32), 0.0f32..90.0], 13), any::<bool>(), 0usize..7)
+    (proptest::collection::vec(prop_oneof![Just(0.0f32), 0.0f32..90.0], 14), any::<bool>(), 0usize..7)
         .prop_map(|(s, autonomous, operator)| Evidence {
             airborne: true,
             autonomous,
@@ -99,13 +106,14 @@ fn evidence() -> impl Strategy<Value = Evidence> {
             link_silent_s: s[9],
             tilt_s: s[10],
             adrift_s: s[11],
+            charge_unknown_s: s[12],
             operator: Action::ALL.get(operator).copied(),
         })
 }
 
 proptest! {
     #[test]
-    fn what_lasts_longer_is_never_judged_milder(e in evidence(), which in 0usize..12, more in 0.0f32..60.0) {
+    fn what_lasts_longer_is_never_judged_milder(e in evidence(), which in 0usize..13, more in 0.0f32..60.0) {
         let p = Policy::default();
         let before = judge(&e, &p);
         let mut worse = e;
@@ -121,6 +129,7 @@ proptest! {
             8 => &mut worse.height_silent_s,
             9 => &mut worse.link_silent_s,
             10 => &mut worse.adrift_s,
+            11 => &mut worse.charge_unknown_s,
             _ => &mut worse.tilt_s,
         };
         *field += more;

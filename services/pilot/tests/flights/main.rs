@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 mod below;
+mod expiry;
+mod home;
 mod rig;
 mod sense;
 
@@ -93,6 +95,8 @@ fn flies_what_navigation_wishes_and_lands_where_it_says() {
         assert!(rig.now < 25_000 * MS, "{}", rig.core.sentence());
     }
     rig.navigate(SetpointKind::Velocity, Vector::new(0.4, 0.0), NAN);
+    // Nose first: between two cones it would fly more slowly.
+    rig.setpoint.as_mut().unwrap().heading_rad = 0.0;
     rig.run(5.0);
     assert_eq!(rig.channels.source, ChannelSource::Navigation.code());
     assert!((rig.velocity.x - 0.4).abs() < 0.1 && rig.velocity.y.abs() < 0.1, "{:?}", rig.velocity);
@@ -281,10 +285,14 @@ fn the_battery_sends_it_home_and_then_down() {
 #[test]
 fn a_take_off_is_refused_in_words() {
     type Change = fn(&mut Rig);
-    let cases: [(Change, &str); 8] = [
+    let cases: [(Change, &str); 12] = [
         (|r| r.pose_state = LocalizationState::Converging, "does not know where it is"),
         (|r| r.localization_dead = true, "the localization is silent"),
         (|r| r.cell_volts = 3.5, "battery at 3.50 V a cell, 3.60 needed"),
+        (|r| r.cell_volts = f32::NAN, "does not tell the battery's voltage"),
+        (|r| r.cell_volts = 0.0, "does not tell the battery's voltage"),
+        (|r| r.power_told = false, "does not tell the battery's voltage"),
+        (|r| r.drawn_mah = f32::NAN, "does not tell the charge drawn"),
         (|r| r.link_state = LinkState::Silent, "flight controller: controller silent"),
         (|r| r.blocks = 4, "will not arm: no gyro"),
         (|r| r.down_health = SonarHealth::Stuck, "the down sonar is not healthy"),

@@ -103,6 +103,9 @@ pub(crate) struct Rig {
     pub(crate) link_state: LinkState,
     pub(crate) blocks: u32,
     pub(crate) cell_volts: f32,
+    pub(crate) drawn_mah: f32,
+    /// Whether the controller tells of its battery.
+    pub(crate) power_told: bool,
     pub(crate) will_arm: bool,
     pub(crate) channels: Channels,
     pub(crate) state: PilotState,
@@ -157,6 +160,8 @@ impl Rig {
             link_state: LinkState::Up,
             blocks: 0,
             cell_volts: 4.0,
+            drawn_mah: 100.0,
+            power_told: true,
             will_arm: true,
             channels: Channels::default(),
             state: PilotState::default(),

@@ -41,9 +41,14 @@ impl Rig {
             state.header.stamp_ns = now;
             self.core.flight_state(&state);
         }
-        if self.steps.is_multiple_of(25) {
-            let mut power =
-                Power { volts: 4.0 * self.cell_volts, cells: 4, amps: 11.0, ..Default::default() };
+        if self.power_told && self.steps.is_multiple_of(25) {
+            let mut power = Power {
+                volts: 4.0 * self.cell_volts,
+                cells: 4,
+                amps: 11.0,
+                drawn_mah: self.drawn_mah,
+                ..Default::default()
+            };
             power.header.stamp_ns = now;
             self.core.power(&power);
         }
