@@ -202,6 +202,9 @@ fn show(report: &FlightReport, demo: &Demo, json: bool) -> Result<()> {
             100.0 * p95
         );
     }
+    if report.stalled_s > 0.0 {
+        println!("the machine stalled: the world stood still for {:.1} s in all", report.stalled_s);
+    }
     for failsafe in &report.failsafes {
         println!("failsafe: {failsafe}");
     }

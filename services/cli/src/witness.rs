@@ -57,8 +57,13 @@ impl Orders {
     }
 }
 
-/// Truth kept while estimates for its times may still come, seconds times 50 Hz.
+/// Truth kept while estimates for its times may still come: 1.3 s at 50 Hz.
 const TRUTH_KEPT: usize = 64;
+/// An estimate older than this stands still for its readers while the drone moves on: five poses of 20 Hz are missing.
+const FRESH_NS: u64 = 250_000_000;
+/// A later start of the world's clock than this is a stall: steps are whole milliseconds, and what a stall skips is 200 ms
+/// or more.
+const STALL_S: f64 = 0.05;
 
 /// Everything that is seen of one flight.
 pub struct Witness {
@@ -82,6 +87,46 @@ pub struct Witness {
     failsafes: Vec<String>,
     flown: bool,
     last_track_s: f64,
+    stalls: Stalls,
+    digest: u64,
+}
+
+/// How long the world stood still: its clock starts later on the machine's clock after every stall.
+#[derive(Debug, Clone, Copy, Default)]
+struct Stalls {
+    /// Where the world's clock started on the machine's clock, seconds, as the newest truth has it.
+    start_s: Option<f64>,
+    total_s: f64,
+}
+
+impl Stalls {
+    fn follow(&mut self, truth: &Truth) {
+        let start_s = truth.header.stamp_ns as f64 * 1e-9 - truth.time_s;
+        let late_s = self.start_s.map_or(0.0, |before| start_s - before);
+        if self.start_s.is_none() || late_s > STALL_S {
+            self.start_s = Some(start_s);
+            self.total_s += late_s;
+        }
+    }
+}
+
+/// Where an estimate is by now: while it is fresh it moves with the truth since its time, so that its error is that of its
+/// own time; later it stands still.
+fn carried_on(pose: &Pose, then: Option<&Truth>, now: &Truth) -> (f32, f32, f32) {
+    let estimate = (pose.x_m, pose.y_m, pose.heading_rad);
+    match then {
+        Some(then) if now.header.stamp_ns.saturating_sub(pose.estimated_ns) <= FRESH_NS => (
+            estimate.0 + now.x_m - then.x_m,
+            estimate.1 + now.y_m - then.y_m,
+            estimate.2 + now.yaw_rad - then.yaw_rad,
+        ),
+        _ => estimate,
+    }
+}
+
+/// FNV-1a, 64 bits (Fowler, Noll, Vo), carried on over `bytes`.
+fn digested(digest: u64, bytes: &[u8]) -> u64 {
+    bytes.iter().fold(digest, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 /// What the round says of itself.
@@ -95,8 +140,10 @@ pub struct Round {
     pub next: (u32, u32),
     /// One sentence.
     pub text: String,
-    /// Rooms that were left out, with reasons.
+    /// Rooms that were left out or seen in part only, with reasons.
     pub skipped: Vec<String>,
+    /// Rooms that were still to be seen.
+    unfinished: Vec<String>,
 }
 
 impl Witness {
@@ -121,28 +168,35 @@ impl Witness {
             failsafes: Vec::new(),
             flown: false,
             last_track_s: f64::NEG_INFINITY,
+            stalls: Stalls::default(),
+            digest: 0xcbf2_9ce4_8422_2325,
         })
     }
 
     /// Takes what has come; to be called at least 20 times a second of the flight.
     pub fn look(&mut self, world: &World) {
+        let mut fresh = 0;
         while let Some(truth) = self.truth.receive() {
             if self.recent.len() == TRUTH_KEPT {
                 self.recent.pop_front();
             }
             self.recent.push_back(*truth);
+            fresh = (fresh + 1).min(TRUTH_KEPT);
+            self.digest = digested(self.digest, bytemuck::bytes_of(&*truth));
+            self.stalls.follow(&truth);
             self.last_truth = Some(*truth);
             self.flown |= truth.armed != 0 && truth.on_ground == 0;
-            if self.last_pose.is_none() {
-                self.observe(world, &truth, None);
-            }
         }
         while let Some(pose) = self.pose.receive() {
+            self.digest = digested(self.digest, bytemuck::bytes_of(&*pose));
             self.last_pose = Some(*pose);
-            // The estimate is compared with the truth of the time that it was made for.
-            if let Some(truth) = self.truth_at(pose.estimated_ns) {
-                self.observe(world, &truth, Some((pose.x_m, pose.y_m, pose.heading_rad)));
-            }
+        }
+        // Every truth counts, whether anybody estimates or not.
+        for k in self.recent.len() - fresh..self.recent.len() {
+            let Some(truth) = self.recent.get(k).copied() else { break };
+            let then = self.last_pose.and_then(|pose| self.truth_at(pose.estimated_ns));
+            let estimate = self.last_pose.map(|pose| carried_on(&pose, then.as_ref(), &truth));
+            self.observe(world, &truth, estimate);
         }
         while let Some(state) = self.pilot.receive() {
             self.note_failsafe(&state);
@@ -250,7 +304,9 @@ impl Witness {
             landed: self.landed(),
             place,
             failsafes: self.failsafes,
-            skipped: self.round.skipped,
+            skipped: self.round.missed(),
+            stalled_s: self.stalls.total_s as f32,
+            digest: self.digest,
         };
         self.scorer.finish(world, ending)
     }
@@ -265,10 +321,60 @@ impl Round {
             patrol.text.as_str().clone_into(&mut self.text);
         }
         self.skipped.clear();
+        self.unfinished.clear();
         for room in patrol.rooms.iter().take(patrol.rooms_used as usize) {
-            if room.state == u32::from(RoomState::Skipped.code()) {
-                self.skipped.push(format!("{}: {}", room.name, room.reason));
+            let (name, reason, percent) = (room.name, room.reason, 100.0 * room.seen);
+            match u8::try_from(room.state).ok().and_then(RoomState::from_code) {
+                Some(RoomState::Skipped) => self.skipped.push(format!("{name}: {reason}")),
+                Some(RoomState::PartlySeen) => {
+                    self.skipped.push(format!("{name}: {percent:.0} % seen, {reason}"));
+                }
+                Some(RoomState::Waiting) => self.unfinished.push(format!("{name}: not flown to")),
+                Some(RoomState::Entered) => {
+                    self.unfinished.push(format!("{name}: {percent:.0} % seen when the round ended"));
+                }
+                _ => {}
             }
         }
+    }
+
+    /// What was not seen of a round that is over.
+    fn missed(mut self) -> Vec<String> {
+        self.skipped.append(&mut self.unfinished);
+        self.skipped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ipc_types::Header;
+
+    fn truth(stamp_s: f64, time_s: f64, x: f32) -> Truth {
+        let header = Header { stamp_ns: (stamp_s * 1e9) as u64, ..Header::default() };
+        Truth { header, time_s, x_m: x, y_m: 2.0, ..Truth::default() }
+    }
+
+    #[test]
+    fn an_estimate_is_compared_with_its_own_time_while_it_is_fresh_and_then_stands_still() {
+        let then = truth(10.0, 10.0, 1.0);
+        let pose = Pose { estimated_ns: 10_000_000_000, x_m: 1.1, y_m: 2.0, ..Pose::default() };
+        let error = |now: &Truth| {
+            let (x, y, _) = carried_on(&pose, Some(&then), now);
+            (x - now.x_m).hypot(y - now.y_m)
+        };
+        // 0.2 m farther within the time that a pose takes to come: still the 10 cm of its own time.
+        assert!((error(&truth(10.2, 10.2, 1.2)) - 0.1).abs() < 1e-5);
+        // Half a second of silence later the drone is 0.4 m from where it is said to be.
+        assert!((error(&truth(10.5, 10.5, 1.5)) - 0.4).abs() < 1e-5);
+    }
+
+    #[test]
+    fn stalls_add_up_and_whole_steps_are_none() {
+        let mut stalls = Stalls::default();
+        for (stamp_s, time_s) in [(100.0, 0.0), (100.021, 0.02), (101.0, 0.8), (101.02, 0.82), (103.0, 2.3)] {
+            stalls.follow(&truth(stamp_s, time_s, 0.0));
+        }
+        assert!((stalls.total_s - 0.7).abs() < 1e-6, "{}", stalls.total_s);
     }
 }

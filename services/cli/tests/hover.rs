@@ -69,3 +69,27 @@ fn the_same_seed_is_the_same_flight_byte_for_byte() {
     assert!(first == fly(5, true), "watching changes the flight");
     assert!(first != fly(6, false));
 }
+
+/// While nobody estimates, the flight is scored on: an error every 60 ms of the time in the air.
+#[test]
+fn a_silent_localization_does_not_stop_the_scoring() {
+    let setup = setup("none");
+    let scored = |silent: bool| {
+        let mut flight = Flight::start(&setup, 2).unwrap();
+        flight.run_for(6.0);
+        flight.order(Verb::TakeOff, f32::NAN, f32::NAN);
+        flight.run_for(12.0);
+        if silent {
+            flight.bus.kill("localization");
+        }
+        flight.run_for(3.0);
+        let last = flight.witness.last_truth.unwrap();
+        assert!(last.armed != 0 && last.on_ground == 0, "in the air");
+        flight.finish()
+    };
+    let (spoken, silent) = (scored(false), scored(true));
+    assert!(spoken.errors.len() > 100, "{}", spoken.errors.len());
+    let missing = spoken.errors.len().abs_diff(silent.errors.len());
+    assert!(missing <= 2, "{} errors and {}", spoken.errors.len(), silent.errors.len());
+    assert!((spoken.report.time_s - silent.report.time_s).abs() < 0.1, "{:?}", silent.report);
+}

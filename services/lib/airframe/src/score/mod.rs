@@ -56,6 +56,10 @@ pub struct Ending {
     pub failsafes: Vec<String>,
     /// What the patrol skipped and why.
     pub skipped: Vec<String>,
+    /// Seconds that the world stood still for, because the machine stalled.
+    pub stalled_s: f32,
+    /// Hash over the messages of the flight.
+    pub digest: u64,
 }
 
 /// Follows one flight.
@@ -191,6 +195,8 @@ impl Scorer {
             failsafes: ending.failsafes,
             skipped: ending.skipped,
             off_pad_m: report::rounded(off_pad),
+            stalled_s: report::rounded(ending.stalled_s),
+            digest: format!("{:016x}", ending.digest),
         };
         FlightScore { report, errors }
     }

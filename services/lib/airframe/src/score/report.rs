@@ -97,6 +97,10 @@ pub struct FlightReport {
     pub skipped: Vec<String>,
     /// Distance between the place of the end and the pad's centre, metres.
     pub off_pad_m: f64,
+    /// Seconds that the world stood still for, because the machine stalled: 0 in every rehearsal.
+    pub stalled_s: f64,
+    /// Hash (FNV-1a, 64 bits, hexadecimal) over every truth and every pose of the flight: equal for equal flights.
+    pub digest: String,
 }
 
 /// Coverage over flights.

@@ -23,6 +23,8 @@ fn ending(place: (f32, f32)) -> Ending {
         place,
         failsafes: Vec::new(),
         skipped: vec!["Store 2: door closed".into()],
+        stalled_s: 0.25,
+        digest: 0xcbf2_9ce4_8422_2325,
     }
 }
 
@@ -115,6 +117,9 @@ fn the_keys_are_those_of_the_design() {
         "lost_s = 0.0",
         "failsafes = []",
         "skipped = [\"Store 2: door closed\"]",
+        "stalled_s = 0.25",
+        "digest = \"cbf29ce484222325\"",
+        "remarks = [",
         "[total]",
         "flights = 1",
         "landed_on_pad = 1",

@@ -201,7 +201,7 @@ impl Simulation {
         };
         let idle = f64::from(vehicle.motors.idle_fraction);
         let ground = GroundWatch::new(&world, place);
-        let touch = Touch::new(&shape);
+        let touch = Touch::new();
         let mut craft = put_down(shape, pack, place, ground.surface_m());
         craft.battery_mut().set_charge(options.charge);
         let (x, y) = (f64::from(place.x), f64::from(place.y));

@@ -250,3 +250,39 @@ fn a_silent_flight_controller_line_stays_silent() {
     sim.advance_to(100 * BYTE_NS);
     assert_eq!(sim.controller_read(&mut [0; 64]), 0);
 }
+
+/// Two centimetres over the level airframe hangs a shelf. Leaning ten degrees away from it the rim on its side rises by
+/// four centimetres and hits it.
+#[test]
+fn the_raised_rim_of_a_tilted_airframe_touches() {
+    let plan = Plan::from_ascii(&ROOM, 0.2);
+    let vehicle = crate::testing::watchman();
+    let (radius, height) = (f64::from(vehicle.body.radius_m), f64::from(vehicle.body.height_m));
+    let bottom = 1.2 + 0.5 * height + 0.02;
+    let file = WorldFile::parse(
+        "room.toml",
+        &format!(
+            "pad = {{ x_m = 4.0, y_m = 3.0 }}\n[[solid]]\nname = \"shelf\"\nshape = \"box\"\nx_m = 4.0\n\
+             y_m = {}\nlength_m = 1.0\nwidth_m = 1.0\nbottom_m = {bottom}\ntop_m = 2.0\n",
+            3.5 + 0.8 * radius
+        ),
+    )
+    .unwrap();
+    let side = Sidecar::default();
+    let world = World::build_as(&plan, &side, &file, ClutterLevel::None, 1, AsBuilt::exact()).unwrap();
+    let mut sim = Simulation::in_world(world, &vehicle, &Options::default());
+    sim.craft.motion_mut().position = Vector3::new(4.0, 3.0, 1.2);
+    let touched = |sim: &Simulation| {
+        let mut touch = Touch::new();
+        touch.look(&sim.world, &sim.craft, 0.0, 0);
+        (touch.contacts(), touch.clearance_m())
+    };
+    let (contacts, clearance) = touched(&sim);
+    assert!(contacts == 0 && (clearance - 0.02).abs() < 2e-3, "level: {contacts}, {clearance} m");
+    for lean in [10.0_f64, -10.0] {
+        sim.craft.motion_mut().attitude =
+            nalgebra::UnitQuaternion::from_euler_angles(lean.to_radians(), 0.0, 0.0);
+        let (contacts, clearance) = touched(&sim);
+        assert!(contacts == 1 && clearance < 0.0, "{lean}: {contacts}, {clearance} m");
+    }
+}

@@ -1,6 +1,6 @@
 //! Whether the airframe touches anything, and what that does to it.
 
-use crate::vehicle::{Push, Quadrotor, Shape, TOUCH_LIMIT_M_S, TOUCH_LIMIT_RAD};
+use crate::vehicle::{Push, Quadrotor, TOUCH_LIMIT_M_S, TOUCH_LIMIT_RAD};
 use crate::world::{CLEARANCE_CAP_M, World};
 use nalgebra::Vector3;
 
@@ -19,8 +19,6 @@ const PROBE_M: f32 = 0.02;
 /// Clearance, contacts, and the solid that pushes.
 #[derive(Clone, Debug)]
 pub(super) struct Touch {
-    radius: f32,
-    height: f32,
     clearance: f32,
     least: f32,
     contacts: u32,
@@ -32,10 +30,8 @@ pub(super) struct Touch {
 }
 
 impl Touch {
-    pub(super) fn new(shape: &Shape) -> Self {
+    pub(super) fn new() -> Self {
         Self {
-            radius: shape.radius_m as f32,
-            height: shape.height_m as f32,
             clearance: CLEARANCE_CAP_M,
             least: CLEARANCE_CAP_M,
             contacts: 0,
@@ -57,7 +53,7 @@ impl Touch {
             FAR_STEPS
         };
         if step.is_multiple_of(every) {
-            self.solids(world, craft, lowest, lowest > surface_m + AIRBORNE_M);
+            self.solids(world, craft, lowest > surface_m + AIRBORNE_M);
         }
     }
 
@@ -74,12 +70,12 @@ impl Touch {
         self.hard = hard || self.hard && lowest <= surface_m + AIRBORNE_M;
     }
 
-    fn solids(&mut self, world: &World, craft: &Quadrotor, lowest: f64, airborne: bool) {
+    fn solids(&mut self, world: &World, craft: &Quadrotor, airborne: bool) {
         let place = craft.motion().position;
-        let (x, y, bottom) = (place.x as f32, place.y as f32, lowest as f32);
-        let measure = |dx: f32, dy: f32, dz: f32| {
-            world.clearance(x + dx, y + dy, bottom + dz, self.height, self.radius)
-        };
+        let (x, y, cover) = (place.x as f32, place.y as f32, craft.cover());
+        let (bottom, height, radius) = (cover.bottom_m as f32, cover.height_m as f32, cover.radius_m as f32);
+        let measure =
+            |dx: f32, dy: f32, dz: f32| world.clearance(x + dx, y + dy, bottom + dz, height, radius);
         self.clearance = measure(0.0, 0.0, 0.0);
         if airborne {
             self.least = self.least.min(self.clearance);

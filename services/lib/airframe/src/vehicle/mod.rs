@@ -17,7 +17,7 @@ pub use compass::Compass;
 pub use contact::{Push, TOUCH_LIMIT_M_S, TOUCH_LIMIT_RAD};
 pub use flow::{FlowSensor, FlowSettings, Ground, MSP2_SENSOR_OPTIC_FLOW, MSP2_SENSOR_RANGEFINDER};
 pub use imu::Inertial;
-pub use shape::{Shape, Variation};
+pub use shape::{Cover, Shape, Variation};
 
 pub(crate) use noise::normal;
 
@@ -161,6 +161,18 @@ impl Quadrotor {
     pub fn lowest_m(&self) -> f64 {
         let tilt = self.motion.tilt();
         self.motion.position.z - self.shape.foot_drop_m * tilt.cos().abs() - self.shape.radius_m * tilt.sin()
+    }
+
+    /// Puts the airframe somewhere without flying it there.
+    #[cfg(test)]
+    pub(crate) fn motion_mut(&mut self) -> &mut Motion {
+        &mut self.motion
+    }
+
+    /// The upright cylinder that the tilted airframe just fits into.
+    #[must_use]
+    pub fn cover(&self) -> Cover {
+        self.shape.cover(self.motion.position.z, self.motion.tilt())
     }
 
     /// One step of `dt` seconds (1 ms) with motor `commands` 0..=1 in the order rear right, front right,

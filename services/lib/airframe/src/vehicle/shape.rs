@@ -89,7 +89,30 @@ pub struct Shape {
     pub balance_m: [f64; 2],
 }
 
+/// An upright cylinder about the centre of mass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cover {
+    /// Its lowest point above the floor, metres.
+    pub bottom_m: f64,
+    /// Metres.
+    pub height_m: f64,
+    /// Metres.
+    pub radius_m: f64,
+}
+
 impl Shape {
+    /// The upright cylinder that an airframe at this height of its centre (metres) and with this tilt (radians) just
+    /// fits into: from its lowest rim to its highest, as wide as it reaches to the side it leans to.
+    #[must_use]
+    pub fn cover(&self, centre_m: f64, tilt_rad: f64) -> Cover {
+        let (sin, cos) = (tilt_rad.sin().abs(), tilt_rad.cos().abs());
+        let half = 0.5 * self.height_m;
+        let rise = half * cos + self.radius_m * sin;
+        // Across the lean the rim reaches as far as ever.
+        let reach = (self.radius_m * cos + half * sin).max(self.radius_m);
+        Cover { bottom_m: centre_m - rise, height_m: 2.0 * rise, radius_m: reach }
+    }
+
     /// The airframe of a vehicle file as one flight finds it, and its pack.
     #[must_use]
     pub fn new(vehicle: &manifest::Vehicle, variation: &Variation) -> (Self, Pack) {

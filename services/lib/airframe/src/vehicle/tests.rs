@@ -152,3 +152,32 @@ fn flow_is_unbiased_and_has_the_documented_signs() {
     let (rate, _) = decode(Vector3::zeros(), Vector3::new(0.3, 0.2, 0.0));
     assert!((rate[0] + 0.2).abs() < 0.012 && (rate[1] - 0.3).abs() < 0.012, "{rate:?}");
 }
+
+/// Points all over the surface of the tilted cylinder lie in its cover, and one of them on each of its sides.
+#[test]
+fn the_tilted_airframe_just_fits_into_its_cover() {
+    let (mut craft, _) = quadrotor(1.2);
+    let (radius, half) = (craft.shape.radius_m, 0.5 * craft.shape.height_m);
+    for degrees in [0.0, 3.0, 10.0, 25.0, 60.0, 100.0, 180.0] {
+        craft.motion.attitude = UnitQuaternion::from_euler_angles(f64::to_radians(degrees), 0.0, 0.7);
+        let (cover, centre) = (craft.cover(), craft.motion.position);
+        let (mut low, mut high, mut wide) = (f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
+        for step in 0..360 {
+            let (sin, cos) = f64::from(step).to_radians().sin_cos();
+            for z in [-half, half] {
+                let point = centre + craft.motion.attitude * Vector3::new(radius * cos, radius * sin, z);
+                low = low.min(point.z);
+                high = high.max(point.z);
+                wide = wide.max((point.x - centre.x).hypot(point.y - centre.y));
+            }
+        }
+        assert!((cover.bottom_m - low).abs() < 1e-4, "{degrees}: {cover:?}, lowest {low}");
+        assert!(
+            (cover.bottom_m + cover.height_m - high).abs() < 1e-4,
+            "{degrees}: {cover:?}, highest {high}"
+        );
+        assert!(wide <= cover.radius_m + 1e-9, "{degrees}: {cover:?}, widest {wide}");
+        assert!(cover.radius_m < radius.hypot(half) + 1e-9, "{degrees}: {cover:?}");
+        assert!((craft.lowest_m() - low).abs() < 1e-4, "{degrees}");
+    }
+}

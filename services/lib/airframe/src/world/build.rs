@@ -43,7 +43,7 @@ impl World {
     ) -> Result<Self, WorldError> {
         let (ox, oy) = plan.origin();
         let (w, h) = (plan.width() as f32 * plan.resolution(), plan.height() as f32 * plan.resolution());
-        let built = AsBuilt::drawn((ox + w * 0.5, oy + h * 0.5), &mut stream(seed, BUILT));
+        let built = AsBuilt::drawn((ox + w * 0.5, oy + h * 0.5), (w, h), &mut stream(seed, BUILT));
         Self::build_as(plan, side, file, clutter, seed, built)
     }
 
