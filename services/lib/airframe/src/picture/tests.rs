@@ -41,6 +41,8 @@ fn a_picture_shows_paths_calls_and_escapes_names() {
         place: (2.0, 3.0),
         failsafes: Vec::new(),
         skipped: vec!["R&D <lab>: door closed".into()],
+        stalled_s: 0.0,
+        digest: 0,
     };
     let report = scorer.finish(&world, ending).report;
     let labels = [("Hall".to_owned(), 5.0, 3.0)];
