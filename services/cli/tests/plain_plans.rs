@@ -77,7 +77,7 @@ fn a_pad_that_cannot_be_is_refused_in_one_sentence() {
     let wall = refusal(&plan, &["--pad", "0.02,1.0,0"]);
     assert!(wall.contains("the pad at (0.02, 1.00) is inside a wall"), "{wall}");
     let tight = refusal(&plan, &["--pad", "0.3,1.0,0"]);
-    assert!(tight.contains("from a wall, needed is 0.23 m"), "{tight}");
+    assert!(tight.contains("from a wall, needed is 0.22 m"), "{tight}");
     let outside = refusal(&plan, &["--pad", "-90,1.0,0"]);
     assert!(outside.contains("outside the plan"), "{outside}");
     // The side file names one pad, the world file another one: the drone would be lost from the start.

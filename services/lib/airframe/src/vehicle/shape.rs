@@ -108,8 +108,13 @@ impl Shape {
         let (sin, cos) = (tilt_rad.sin().abs(), tilt_rad.cos().abs());
         let half = 0.5 * self.height_m;
         let rise = half * cos + self.radius_m * sin;
-        // Across the lean the rim reaches as far as ever.
-        let reach = (self.radius_m * cos + half * sin).max(self.radius_m);
+        // Of the rim's points x = r cos p cos t + h/2 sin t, y = r sin p the farthest from the centre lies on the side it
+        // leans to while the lean is small, and beside it later, where it is as far as the rim is from the centre in space.
+        let reach = if self.radius_m * sin < half * cos {
+            self.radius_m * cos + half * sin
+        } else {
+            self.radius_m.hypot(half)
+        };
         Cover { bottom_m: centre_m - rise, height_m: 2.0 * rise, radius_m: reach }
     }
 

@@ -255,8 +255,15 @@ fn shipped(name: &str, seed: u64) -> World {
 #[test]
 fn the_shipped_worlds_stand_up_and_leave_room_to_fly() {
     for (name, least_m2) in [("demo", 100.0), ("hall", 20.0), ("two-rooms", 10.0)] {
-        for seed in 1..=6 {
+        let mut open = 0;
+        for seed in 1..=8 {
             let world = shipped(name, seed);
+            // A draw may shut every way out of the rooms about the pad: nobody leaves them then.
+            let shut = |door: &str| world.doors().iter().any(|known| known.name == door && known.shut);
+            if shut("Lobby") && (shut("Lobby to Office 1") || shut("Office 1")) {
+                continue;
+            }
+            open += 1;
             let coverage = crate::score::Coverage::new(&world, 0.225);
             let cells = coverage.reachable().iter().filter(|r| **r).count() as f32;
             let area = cells * world.ground().resolution().powi(2);
@@ -270,5 +277,6 @@ fn the_shipped_worlds_stand_up_and_leave_room_to_fly() {
                 }
             }
         }
+        assert!(open >= 6, "{name}: {open} of 8 draws leave the pad's room open");
     }
 }
