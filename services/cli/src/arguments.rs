@@ -82,7 +82,8 @@ pub(crate) enum Verb {
     ///
     /// Exits with 0 when all flights were flown and their figures written, whatever their outcome: contacts and
     /// failsafes are figures, not errors.
-    Rehearse(Rehearse),
+    // Many options: boxed, so that the other verbs do not carry their size.
+    Rehearse(Box<Rehearse>),
     /// Start the simulated system, fly one round, draw it and report on it.
     Demo(Demo),
 }
@@ -280,7 +281,7 @@ mod tests {
     const CONTRACT: &str = "sereno rehearse --plan plan.yaml --world world.toml --clutter full --vehicle watchman \
                             --flights 20 --seed 1 --avoid vfh --start pad --json OUT";
 
-    fn rehearsal(line: &str) -> (Rehearse, bool) {
+    fn rehearsal(line: &str) -> (Box<Rehearse>, bool) {
         let arguments = Arguments::try_parse_from(line.split_whitespace()).unwrap();
         let Verb::Rehearse(rehearse) = arguments.verb else { panic!("{line}") };
         (rehearse, arguments.json)

@@ -137,10 +137,10 @@ fn a_pad_must_stand_in_free_space() {
     assert!(text(0.7, 1.5).contains("is 0.20 m from a wall, needed is 0.50 m"), "{}", text(0.7, 1.5));
 }
 
-/// The middle row of a picture of three rows, as a PNG of any depth.
-fn png(row: image::DynamicImage) -> Vec<u8> {
+/// A picture as a PNG of its own depth.
+fn png(picture: &image::DynamicImage) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
-    row.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
     bytes.into_inner()
 }
 
@@ -154,7 +154,7 @@ fn transparent_cells_are_unknown_in_scale_mode_and_shades_in_trinary() {
     let row = [[0, 255], [254, 255], [205, 255], [254, 0], [0, 254]];
     let cells: Vec<u8> = [row, row, row].concat().concat();
     let picture = image::GrayAlphaImage::from_raw(5, 3, cells).unwrap();
-    let bytes = png(image::DynamicImage::ImageLumaA8(picture));
+    let bytes = png(&image::DynamicImage::ImageLumaA8(picture));
     let scale = load(&format!("{HEADER}mode: scale\n"), &bytes).unwrap();
     assert_eq!(middle_row(&scale), [Cell::Occupied, Cell::Free, Cell::Unknown, Cell::Unknown, Cell::Unknown]);
     let trinary = load(HEADER, &bytes).unwrap();
@@ -166,7 +166,7 @@ fn a_picture_of_sixteen_bits_is_the_same_plan_and_no_percents() {
     let row = [0_u16, 254 * 257, 205 * 257, 65_535];
     let picture =
         image::ImageBuffer::<image::Luma<u16>, _>::from_raw(4, 3, [row, row, row].concat()).unwrap();
-    let bytes = png(image::DynamicImage::ImageLuma16(picture));
+    let bytes = png(&image::DynamicImage::ImageLuma16(picture));
     let plan = load(HEADER, &bytes).unwrap();
     assert_eq!(middle_row(&plan), [Cell::Occupied, Cell::Free, Cell::Unknown, Cell::Free]);
     let said = sentence(load(&format!("{HEADER}mode: raw\n"), &bytes));
@@ -180,7 +180,7 @@ fn a_picture_of_sixteen_bits_is_the_same_plan_and_no_percents() {
 fn colours_and_other_white_points_are_read() {
     let row = [[0, 0, 0], [254, 254, 254], [205, 205, 205]];
     let picture = image::RgbImage::from_raw(3, 3, [row, row, row].concat().concat()).unwrap();
-    let plan = load(HEADER, &png(image::DynamicImage::ImageRgb8(picture))).unwrap();
+    let plan = load(HEADER, &png(&image::DynamicImage::ImageRgb8(picture))).unwrap();
     assert_eq!(middle_row(&plan), [Cell::Occupied, Cell::Free, Cell::Unknown]);
     // A PGM may say that 100 is white, or 1000 in two bytes.
     let hundred = [&b"P5\n3 3\n100\n"[..], &[0, 100, 80].repeat(3)].concat();
