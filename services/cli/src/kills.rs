@@ -77,6 +77,7 @@ impl Kills {
         if let Some(state) = witness.last_pilot
             && let Some(action) = FailsafeAction::from_code(state.action)
             && let Some(cause) = FailsafeCause::from_code(state.cause)
+            && action != FailsafeAction::None
             && self.worst.is_none_or(|(worst, _)| action.code() > worst.code())
         {
             self.worst = Some((action, cause));
