@@ -24,6 +24,7 @@ mod sensors;
 mod sim;
 mod text;
 mod topics;
+mod trace;
 
 pub use field::{Field, Header, Message, layout_of_name, layout_step};
 pub use flight::*;
@@ -36,6 +37,7 @@ pub use sensors::*;
 pub use sim::*;
 pub use text::Text;
 pub use topics::{TopicVisitor, visit_all, visit_topic};
+pub use trace::{MAX_RUNS, Run, Runs, Trace};
 
 /// Seconds from `earlier` to `later`, negative when they are the other way round.
 #[must_use]

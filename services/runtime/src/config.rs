@@ -1,7 +1,9 @@
 //! Configuration files: unknown keys and values out of range are refused by name.
 
+use crate::{StartError, fnv};
 use std::fmt::Display;
 use std::ops::RangeInclusive;
+use std::path::Path;
 
 /// What is wrong with a configuration file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -71,6 +73,13 @@ pub trait Validate {
     fn validate(&self) -> Result<(), ConfigError>;
 }
 
+/// For services without a configuration.
+impl Validate for () {
+    fn validate(&self) -> Result<(), ConfigError> {
+        Ok(())
+    }
+}
+
 /// Parses and checks a configuration file.
 ///
 /// # Errors
@@ -85,6 +94,24 @@ where
     })?;
     config.validate().map_err(|error| error.in_file(file))?;
     Ok(config)
+}
+
+/// The configuration in the file `name` below `root`, and the hash of its bytes for the journal; the default and 0 when
+/// the manifest names none.
+///
+/// # Errors
+/// When the file is missing or wrong.
+pub(crate) fn read_config<C>(root: &Path, name: &str) -> Result<(C, u64), StartError>
+where
+    C: serde::de::DeserializeOwned + Default + Validate,
+{
+    if name.is_empty() {
+        return Ok((C::default(), 0));
+    }
+    let path = root.join(name);
+    let text = std::fs::read_to_string(&path)
+        .map_err(|reason| StartError::Read { path: path.display().to_string(), reason })?;
+    Ok((parse_config(name, &text)?, fnv(text.as_bytes())))
 }
 
 #[cfg(test)]

@@ -1,158 +1,186 @@
-//! What a step took from its inputs: the raw material of `trace/<service>` and of the loss counters.
+//! `trace/<service>`: what each step took from its inputs.
+//!
+//! The same on both buses, and told by no real clock. Inputs note what is taken in [`Taken`] while a step runs;
+//! [`Journal`] publishes it at the step's end.
 
-use ipc_types::{Drained, Header};
-use std::cell::Cell;
+use crate::port::StepContext;
+use crate::{Output, Ports, Start, StartError};
+use ipc_types::{Header, MAX_RUNS, Message, Run, Trace};
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
 
-/// Counters of one input. Shared between the input and the runtime that journals its steps.
+/// What the present step has taken so far. Shared by the inputs of a service and its journal; of constant size, so that
+/// nothing is allocated.
 #[derive(Debug, Default)]
-pub struct InputStats {
-    first: Cell<u64>,
-    count: Cell<u32>,
-    incarnation: Cell<u32>,
-    last_publisher: Cell<(u32, u32)>,
-    last_sequence: Cell<u64>,
-    lost: Cell<u64>,
-    failed: Cell<u64>,
+pub(crate) struct Taken {
+    /// Programs beside the services have no steps: nothing is noted for them.
+    journaled: Cell<bool>,
+    step: Cell<u64>,
+    runs: RefCell<[Run; MAX_RUNS]>,
+    used: Cell<usize>,
+    truncated: Cell<u32>,
 }
 
-impl InputStats {
-    /// Notes that shared memory refused to hand out a message.
-    pub(crate) fn failed(&self) {
-        self.failed.set(self.failed.get() + 1);
-    }
-
-    /// How often shared memory refused to hand out a message.
-    pub(crate) fn failures(&self) -> u64 {
-        self.failed.get()
-    }
-
-    /// Notes that a message was taken; a gap in the sequence of one incarnation is a loss.
-    pub(crate) fn taken(&self, header: &Header) {
-        let publisher = (header.publisher, header.incarnation);
-        if self.last_publisher.get() == publisher {
-            let gap = header.sequence.saturating_sub(self.last_sequence.get() + 1);
-            self.lost.set(self.lost.get() + gap);
-        }
-        self.last_publisher.set(publisher);
-        self.last_sequence.set(header.sequence);
-        if self.count.get() == 0 {
-            self.first.set(header.sequence);
-        }
-        self.count.set(self.count.get() + 1);
-        self.incarnation.set(header.incarnation);
-    }
-
-    /// Messages that were overwritten before this input took them.
-    pub fn lost(&self) -> u64 {
-        self.lost.get()
-    }
-
-    /// What was taken since the last call.
-    pub(crate) fn drain(&self) -> Drained {
-        let drained =
-            Drained { first: self.first.get(), count: self.count.get(), incarnation: self.incarnation.get() };
-        self.first.set(0);
-        self.count.set(0);
-        drained
-    }
-}
-
-/// Counters of one output. Shared between the output and the runtime that reports them.
+/// Where the newest run of one input stands.
 #[derive(Debug, Default)]
-pub(crate) struct OutputStats {
-    /// Silence longer than this is a fault, nanoseconds; 0 for none.
-    deadline_ns: u64,
-    refused: Cell<u64>,
-    failed: Cell<u64>,
-    missed: Cell<u64>,
-    /// When the last message was sent; `None` before the first, whose time nobody can promise.
-    sent_ns: Cell<Option<u64>>,
-    /// The present silence is counted already.
-    overdue: Cell<bool>,
+pub(crate) struct Cursor {
+    /// The step that it belongs to, counted from 1; 0 for none.
+    step: Cell<u64>,
+    /// Its place; [`MAX_RUNS`] when it found none.
+    place: Cell<usize>,
+    /// The step in which the input was found empty.
+    dry: Cell<u64>,
 }
 
-impl OutputStats {
-    pub(crate) fn with_deadline(deadline_ns: u64) -> Self {
-        Self { deadline_ns, ..Self::default() }
+impl Taken {
+    /// Whether somebody keeps a journal; when not, there are no steps either.
+    pub(crate) fn is_journaled(&self) -> bool {
+        self.journaled.get()
     }
 
-    /// Notes that no place was free for a message.
-    pub(crate) fn refused(&self) {
-        self.refused.set(self.refused.get() + 1);
+    /// Number of the present step and its start, from 1.
+    fn now(&self) -> u64 {
+        self.step.get() + 1
     }
 
-    /// How often no place was free.
-    pub(crate) fn refusals(&self) -> u64 {
-        self.refused.get()
+    /// Notes that an input has nothing more. It stays so to the end of the step: a message that came while the step
+    /// ran would otherwise be taken by the second of two looks, and the journal does not tell one look from another.
+    pub(crate) fn dry(&self, cursor: &Cursor) {
+        cursor.dry.set(self.now());
     }
 
-    /// Messages that did not leave, or not to everybody.
-    pub(crate) fn unsent(&self) -> u64 {
-        self.refused.get() + self.failed.get()
+    /// Whether an input was empty already in this step.
+    pub(crate) fn is_dry(&self, cursor: &Cursor) -> bool {
+        self.is_journaled() && cursor.dry.get() == self.now()
     }
 
-    /// Notes a message that was sent at `now`, `whole` when everybody has it.
-    pub(crate) fn sent(&self, now: u64, whole: bool) {
-        if !whole {
-            self.failed.set(self.failed.get() + 1);
+    /// Notes a message of the input that `cursor` belongs to.
+    pub(crate) fn note(&self, cursor: &Cursor, port: u16, topic: u32, header: &Header) {
+        if !self.is_journaled() {
+            return;
         }
-        self.watch(now);
-        self.sent_ns.set(Some(now));
-        self.overdue.set(false);
-    }
-
-    /// Counts a silence that has become too long by `now`, once.
-    pub(crate) fn watch(&self, now: u64) {
-        let late = self.sent_ns.get().is_some_and(|sent| now.saturating_sub(sent) > self.deadline_ns);
-        if late && self.deadline_ns > 0 && !self.overdue.replace(true) {
-            self.missed.set(self.missed.get() + 1);
+        let mut runs = self.runs.borrow_mut();
+        if cursor.step.get() == self.now() {
+            match runs.get_mut(cursor.place.get()) {
+                Some(run) if continues(run, header) => {
+                    run.count += 1;
+                    return;
+                }
+                Some(_) => {}
+                // Had a later message a place and an earlier one none, the order would be wrong without a word.
+                None => return self.truncate(),
+            }
         }
+        cursor.step.set(self.now());
+        let place = self.used.get();
+        cursor.place.set(place);
+        let Some(run) = runs.get_mut(place) else { return self.truncate() };
+        *run = Run {
+            first: header.sequence,
+            publisher: header.publisher,
+            incarnation: header.incarnation,
+            topic,
+            port,
+            count: 1,
+        };
+        self.used.set(place + 1);
     }
 
-    /// Silences longer than the deadline.
-    pub(crate) fn missed(&self) -> u64 {
-        self.missed.get()
+    fn truncate(&self) {
+        self.truncated.set(self.truncated.get().saturating_add(1));
+    }
+
+    fn write(&self, trace: &mut Trace) {
+        let runs = self.runs.borrow();
+        trace.runs.set(runs.get(..self.used.get()).unwrap_or_default());
+        trace.truncated = self.truncated.get();
+    }
+
+    /// The step is over.
+    fn close(&self) {
+        self.step.set(self.step.get() + 1);
+        self.used.set(0);
+        self.truncated.set(0);
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Whether a message is the next of a run.
+fn continues(run: &Run, header: &Header) -> bool {
+    (run.publisher, run.incarnation) == (header.publisher, header.incarnation)
+        && run.count < u16::MAX
+        && run.first.checked_add(run.count.into()) == Some(header.sequence)
+}
 
-    const MS: u64 = 1_000_000;
+/// Publishes `trace/<service>`.
+pub struct Journal {
+    trace: Output<Trace>,
+    taken: Rc<Taken>,
+    context: Rc<StepContext>,
+    step: u64,
+    seed: u64,
+    config: u64,
+    plan: u64,
+    ports: u32,
+}
 
-    #[test]
-    fn each_silence_past_the_deadline_counts_once() {
-        let output = OutputStats::with_deadline(100 * MS);
-        output.watch(5_000 * MS);
-        assert_eq!(output.missed(), 0, "nothing was promised before the first message");
-        for step in 0..50 {
-            output.sent(5_000 * MS + step * 100 * MS, true);
-        }
-        assert_eq!(output.missed(), 0, "just in time");
-        let last = 9_900 * MS;
-        output.watch(last + 100 * MS);
-        assert_eq!(output.missed(), 0);
-        for late in 101..400 {
-            output.watch(last + late * MS);
-        }
-        assert_eq!(output.missed(), 1, "seen before it ends");
-        output.sent(last + 400 * MS, true);
-        assert_eq!(output.missed(), 1, "and not again at its end");
-        output.sent(last + 501 * MS, true);
-        assert_eq!(output.missed(), 2);
-        let on_demand = OutputStats::with_deadline(0);
-        on_demand.sent(0, true);
-        on_demand.watch(u64::MAX);
-        assert_eq!(on_demand.missed(), 0);
+impl Journal {
+    /// Opens the journal of the service whose ports these are. From now on what its inputs give is noted.
+    ///
+    /// # Errors
+    /// When the service is none of the manifest's, or shared memory refuses.
+    pub fn open(ports: &mut Ports) -> Result<Self, StartError> {
+        let trace = ports.output_of(&format!("{}/{}", Trace::TOPIC, ports.service))?;
+        ports.taken.journaled.set(true);
+        Ok(Self {
+            trace,
+            taken: Rc::clone(&ports.taken),
+            context: Rc::clone(&ports.context),
+            step: 0,
+            seed: 0,
+            config: 0,
+            plan: 0,
+            ports: 0,
+        })
     }
 
-    #[test]
-    fn what_did_not_leave_is_counted() {
-        let output = OutputStats::default();
-        output.refused();
-        output.sent(1, false);
-        output.sent(2, true);
-        assert_eq!((output.refusals(), output.unsent()), (1, 2));
+    /// Makes the entry of the start, with what was taken meanwhile: retained samples too. `config` is the hash of the
+    /// configuration file.
+    pub fn begin(&mut self, ports: &Ports, start: &Start, config: u64) {
+        self.seed = start.seed;
+        self.config = config;
+        self.plan = start.plan_hash.get();
+        self.ports = ports.inputs.len() as u32;
+        self.publish();
+        self.taken.close();
+    }
+
+    /// Makes the entry of the step that is over. Where nobody listens and nobody can have missed it, in lockstep, it is
+    /// not written; the entry of the start always is, for who joins before the first step.
+    pub fn step(&mut self) {
+        self.step += 1;
+        if self.trace.is_heard() {
+            self.publish();
+        }
+        self.taken.close();
+    }
+
+    /// Steps since start.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.step
+    }
+
+    fn publish(&mut self) {
+        // An entry that finds no place is counted by its output, and missing in the step numbers.
+        let Some(mut loan) = self.trace.loan() else { return };
+        let trace: &mut Trace = &mut loan;
+        trace.step = self.step;
+        trace.now_ns = self.context.now.get();
+        trace.seed = self.seed;
+        trace.config = self.config;
+        trace.plan = self.plan;
+        trace.ports = self.ports;
+        self.taken.write(trace);
+        loan.send();
     }
 }

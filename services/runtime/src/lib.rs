@@ -10,18 +10,22 @@
 //!   one seed, many times faster than real time.
 //!
 //! Both have one port API ([`Input`], [`Output`]) with equal depth, overflow (oldest dropped, counted),
-//! history and late-joiner rules; `tests/conformance.rs` runs one suite on both.
+//! history and late-joiner rules; `tests/conformance` runs one suite on both.
 //!
 //! This is the only services-side crate that knows iceoryx2.
 
 mod access;
 mod config;
+mod counters;
 mod device;
 mod error;
+mod health;
+mod instance;
 mod journal;
 mod lockstep;
 mod notify;
 mod port;
+mod ports;
 mod process;
 mod service;
 pub mod shm;
@@ -30,9 +34,11 @@ mod start;
 pub use config::{ConfigError, Validate, parse_config, within};
 pub use device::{ByteDevice, DeviceError, Devices, MemoryDevice, NoDevices};
 pub use error::StartError;
-pub use journal::InputStats;
-pub use lockstep::Lockstep;
-pub use port::{Guard, Input, Limits, Loan, Output, Ports};
+pub use instance::Instance;
+pub use journal::Journal;
+pub use lockstep::{Lockstep, Replay};
+pub use port::{Guard, Input, Limits, Loan, Output};
+pub use ports::Ports;
 pub use process::{Tool, env, known_topics, load_manifest, main, monotonic_ns};
 pub use service::Service;
 pub use start::{Cache, Start};
@@ -43,6 +49,14 @@ pub fn fnv(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
     })
+}
+
+/// What stands for a name in messages, of a publisher in headers and of a topic in the step journal: its FNV-1a hash,
+/// folded to 32 bits.
+#[must_use]
+pub fn name_hash(name: &str) -> u32 {
+    let hash = fnv(name.as_bytes());
+    (hash ^ (hash >> 32)) as u32
 }
 
 /// One step of the SplitMix64 generator: turns any seed into well-mixed ones (Steele, Lea, Flood 2014).

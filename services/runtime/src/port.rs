@@ -1,20 +1,19 @@
 //! Typed ports: one API on two buses.
 //!
-//! Rules that hold on both, proved by `tests/conformance.rs`:
+//! Rules that hold on both, proved by `tests/conformance`:
 //! - an [`Input`] keeps at most `depth` messages; when one more comes the oldest is dropped, and the gap
 //!   in the sequence is counted as lost when the next is taken;
 //! - an input that joins late gets the newest message of a live publisher, and nothing older;
 //! - a message that is held ([`Guard`]) stays as it is until the guard is dropped;
+//! - an input that had nothing more in a step of a service has nothing more until the next step;
 //! - a [`Loan`] that is dropped unsent is not seen by anyone and uses up no sequence number;
 //! - no port allocates after start.
 
-use crate::device::{ByteDevice, Devices};
-use crate::journal::{InputStats, OutputStats};
-use crate::lockstep::bus::{Bus, LockstepInput, LockstepOutput};
-use crate::shm::{Refused, SharedInput, SharedLoan, SharedNode, SharedOutput, SharedSample};
-use crate::{StartError, access, fnv};
+use crate::counters::{InputStats, OutputStats};
+use crate::lockstep::bus::{LockstepInput, LockstepOutput};
+use crate::name_hash;
+use crate::shm::{Refused, SharedInput, SharedLoan, SharedOutput, SharedSample};
 use ipc_types::{Header, Message};
-use manifest::{Manifest, Subscription};
 use std::cell::Cell;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
@@ -47,35 +46,36 @@ impl Limits {
 pub(crate) struct StepContext {
     pub now: Cell<u64>,
     pub publisher: u32,
-    pub incarnation: u32,
+    pub incarnation: Cell<u32>,
 }
 
 impl StepContext {
-    pub(crate) fn new(service: &str, incarnation: u32) -> Rc<Self> {
-        Rc::new(Self { now: Cell::new(0), publisher: Self::publisher_of(service), incarnation })
-    }
-
-    /// What stands for a publisher's name in the header of its messages.
-    pub(crate) fn publisher_of(service: &str) -> u32 {
-        let hash = fnv(service.as_bytes());
-        (hash ^ (hash >> 32)) as u32
+    pub(crate) fn new(service: &str, incarnation: u32, now: u64) -> Rc<Self> {
+        Rc::new(Self {
+            now: Cell::new(now),
+            publisher: name_hash(service),
+            incarnation: Cell::new(incarnation),
+        })
     }
 }
 
-enum InputKind<T: Message> {
+pub(crate) enum InputKind<T: Message> {
     Shared(SharedInput<T>),
     Lockstep(LockstepInput<T>),
 }
 
 /// Where messages of one topic arrive.
 pub struct Input<T: Message> {
-    kind: InputKind<T>,
-    stats: Rc<InputStats>,
+    pub(crate) kind: InputKind<T>,
+    pub(crate) stats: Rc<InputStats>,
 }
 
 impl<T: Message> Input<T> {
     /// The oldest message not yet taken.
     pub fn receive(&mut self) -> Option<Guard<T>> {
+        if self.stats.is_empty() {
+            return None;
+        }
         let guard = match &mut self.kind {
             InputKind::Shared(input) => match input.receive() {
                 Ok(sample) => sample.map(|sample| Guard(GuardKind::Shared(sample))),
@@ -85,9 +85,12 @@ impl<T: Message> Input<T> {
                 }
             },
             InputKind::Lockstep(input) => input.receive().map(|slot| Guard(GuardKind::Lockstep(slot))),
-        }?;
-        self.stats.taken(guard.header());
-        Some(guard)
+        };
+        match &guard {
+            Some(guard) => self.stats.taken(guard.header()),
+            None => self.stats.empty(),
+        }
+        guard
     }
 
     /// Takes everything and returns the newest; `None` when nothing new has come.
@@ -124,17 +127,17 @@ impl<T: Message> Deref for Guard<T> {
     }
 }
 
-enum OutputKind<T: Message> {
+pub(crate) enum OutputKind<T: Message> {
     Shared(Rc<SharedOutput<T>>),
     Lockstep(LockstepOutput<T>),
 }
 
 /// Where messages of one topic leave.
 pub struct Output<T: Message> {
-    kind: OutputKind<T>,
-    context: Rc<StepContext>,
-    sequence: Rc<Cell<u64>>,
-    stats: Rc<OutputStats>,
+    pub(crate) kind: OutputKind<T>,
+    pub(crate) context: Rc<StepContext>,
+    pub(crate) sequence: Rc<Cell<u64>>,
+    pub(crate) stats: Rc<OutputStats>,
 }
 
 impl<T: Message> Output<T> {
@@ -181,6 +184,14 @@ impl<T: Message> Output<T> {
     pub fn refused(&self) -> u64 {
         self.stats.refusals()
     }
+
+    /// Whether somebody may read what is sent now. In shared memory that cannot be excluded.
+    pub(crate) fn is_heard(&self) -> bool {
+        match &self.kind {
+            OutputKind::Shared(_) => true,
+            OutputKind::Lockstep(output) => output.has_readers(),
+        }
+    }
 }
 
 enum LoanKind<T: Message> {
@@ -205,7 +216,7 @@ impl<T: Message> Loan<T> {
             stamp_ns: self.context.now.get(),
             sequence,
             publisher: self.context.publisher,
-            incarnation: self.context.incarnation,
+            incarnation: self.context.incarnation.get(),
         };
         let now = self.context.now.get();
         let whole = match self.kind {
@@ -236,155 +247,5 @@ impl<T: Message> DerefMut for Loan<T> {
             // The slot was taken out of the pool, so this is its only owner and nothing is copied.
             LoanKind::Lockstep(_, slot) => Rc::make_mut(slot),
         }
-    }
-}
-
-pub(crate) enum BusKind {
-    Shared(Rc<SharedNode>),
-    Lockstep(Rc<Bus>),
-}
-
-/// The ports of one service, checked against the manifest as they are opened.
-pub struct Ports {
-    pub(crate) bus: BusKind,
-    pub(crate) service: String,
-    pub(crate) manifest: Rc<Manifest>,
-    pub(crate) context: Rc<StepContext>,
-    pub(crate) inputs: Vec<Rc<InputStats>>,
-    pub(crate) outputs: Vec<Rc<OutputStats>>,
-    /// Topics that were opened, to read or to publish.
-    pub(crate) opened: Vec<String>,
-    pub(crate) devices: Box<dyn Devices>,
-    /// Topics for which the keeper holds something for this start of the service.
-    pub(crate) retained: Vec<String>,
-    /// Topics of `retained` that the keeper did not hand over in time.
-    pub(crate) forgotten: Vec<&'static str>,
-}
-
-impl Ports {
-    fn refuse(&self, action: &'static str, topic: &str) -> StartError {
-        StartError::Port { service: self.service.clone(), action, topic: topic.to_owned() }
-    }
-
-    /// An input of the topic of `T`, as deep as the manifest says.
-    ///
-    /// # Errors
-    /// When the manifest does not list the topic for this service or wants it deeper than [`Limits::of`], or shared
-    /// memory refuses.
-    pub fn input<T: Message>(&mut self) -> Result<Input<T>, StartError> {
-        self.input_of(T::TOPIC)
-    }
-
-    /// An input of one topic of a family, such as `health/sonar`.
-    ///
-    /// # Errors
-    /// As [`Ports::input`].
-    pub fn input_of<T: Message>(&mut self, topic: &str) -> Result<Input<T>, StartError> {
-        let most = Limits::of::<T>().depth;
-        let subscription = access::subscription(&self.manifest, &self.service, topic, most);
-        let Some(Subscription { depth, wake }) = subscription else {
-            return Err(self.refuse("subscribe", topic));
-        };
-        if !(1..=most).contains(&depth) {
-            return Err(StartError::Manifest(format!(
-                "{}: service.{}.subscribes.\"{topic}\".depth = {depth}: allowed is 1 to {most} for messages of this size",
-                self.manifest.file, self.service
-            )));
-        }
-        let kind = match &self.bus {
-            BusKind::Shared(node) => InputKind::Shared(node.input(topic, depth)?),
-            BusKind::Lockstep(bus) => InputKind::Lockstep(bus.input(topic, depth, &self.service, wake)),
-        };
-        self.opened.push(topic.to_owned());
-        let stats = Rc::new(InputStats::default());
-        self.inputs.push(Rc::clone(&stats));
-        Ok(Input { kind, stats })
-    }
-
-    /// The output of the topic of `T`.
-    ///
-    /// # Errors
-    /// When the manifest does not list the topic for this service, or shared memory refuses.
-    pub fn output<T: Message>(&mut self) -> Result<Output<T>, StartError> {
-        self.output_of(T::TOPIC)
-    }
-
-    /// The output of one topic of a family, such as `health/sonar`.
-    ///
-    /// # Errors
-    /// As [`Ports::output`].
-    pub fn output_of<T: Message>(&mut self, topic: &str) -> Result<Output<T>, StartError> {
-        if !access::may_publish(&self.manifest, &self.service, topic) {
-            return Err(self.refuse("publish", topic));
-        }
-        let kind = match &self.bus {
-            BusKind::Shared(node) => OutputKind::Shared(node.output(topic, &self.manifest)?),
-            BusKind::Lockstep(bus) => OutputKind::Lockstep(bus.output(topic)),
-        };
-        let stats =
-            Rc::new(OutputStats::with_deadline(access::deadline_ns(&self.manifest, &self.service, topic)));
-        self.opened.push(topic.to_owned());
-        self.outputs.push(Rc::clone(&stats));
-        Ok(Output { kind, context: Rc::clone(&self.context), sequence: Rc::new(Cell::new(0)), stats })
-    }
-
-    /// Checks that the service has opened every topic that the manifest lists for it: the picture of the wiring is
-    /// only worth something if it shows what is, no more and no less. Devices are left out, as a vehicle may lack one.
-    ///
-    /// # Errors
-    /// Names the first that was not opened.
-    pub(crate) fn check_all_opened(&self) -> Result<(), StartError> {
-        let Some(entry) = self.manifest.services.get(&self.service) else { return Ok(()) };
-        let read = entry.subscribes.keys().map(|topic| ("subscribes", topic));
-        let published = entry.publishes.keys().map(|topic| ("publishes", topic));
-        match read.chain(published).find(|(_, topic)| !self.opened.contains(topic)) {
-            None => Ok(()),
-            Some((how, topic)) => Err(StartError::Manifest(format!(
-                "{}: service.{}.{how}.\"{topic}\": the service does not open it; the manifest must not list it",
-                self.manifest.file, self.service
-            ))),
-        }
-    }
-
-    /// Whether the manifest gives this service the device.
-    #[must_use]
-    pub fn has_device(&self, name: &str) -> bool {
-        access::device(&self.manifest, &self.service, name).is_some()
-    }
-
-    /// The device that the manifest calls `name` for this service.
-    ///
-    /// # Errors
-    /// When the manifest does not list it, or there can be no such device.
-    pub fn device(&mut self, name: &str) -> Result<Box<dyn ByteDevice>, StartError> {
-        let Some(path) = access::device(&self.manifest, &self.service, name) else {
-            return Err(self.refuse("use device", name));
-        };
-        match &self.bus {
-            BusKind::Lockstep(bus) => Ok(bus.device(name)),
-            BusKind::Shared(node) => {
-                let path = node.device_path(path)?;
-                self.devices.device(name, &path)
-            }
-        }
-    }
-
-    /// After a restart: the last valid sample of a retained topic, from the keeper. `None` at the first
-    /// start, and when nothing was ever published.
-    ///
-    /// # Errors
-    /// When shared memory refuses.
-    pub fn retained<T: Message>(&mut self) -> Result<Option<Box<T>>, StartError> {
-        if !self.retained.iter().any(|topic| topic == T::TOPIC) {
-            return Ok(None);
-        }
-        let kept = match &self.bus {
-            BusKind::Shared(node) => node.retained()?,
-            BusKind::Lockstep(bus) => bus.retained(),
-        };
-        if kept.is_none() {
-            self.forgotten.push(T::TOPIC);
-        }
-        Ok(kept)
     }
 }

@@ -1,12 +1,13 @@
 //! A service as its own process.
 
-use crate::config::parse_config;
+use crate::config::read_config;
 use crate::device::Devices;
+use crate::health::HealthReport;
 use crate::notify::Notifier;
-use crate::port::{BusKind, StepContext};
+use crate::ports::BusKind;
 use crate::shm::{RunDir, SharedNode, woken_within};
-use crate::{Cache, Input, Output, Ports, Service, Start, StartError, fnv};
-use ipc_types::{Health, MAX_PORTS, Message, Text, Trace};
+use crate::{Cache, Input, Instance, Ports, Service, Start, StartError};
+use ipc_types::{Message, Text};
 use manifest::Manifest;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -130,16 +131,7 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
         .get(S::NAME)
         .ok_or_else(|| StartError::Manifest(format!("{} has no service {}", manifest.file, S::NAME)))?;
 
-    let mut config_hash = 0;
-    let config = if entry.config.is_empty() {
-        S::Config::default()
-    } else {
-        let path = root.join(&entry.config);
-        let text = std::fs::read_to_string(&path)
-            .map_err(|reason| StartError::Read { path: path.display().to_string(), reason })?;
-        config_hash = fnv(text.as_bytes());
-        parse_config(&entry.config, &text)?
-    };
+    let (config, config_hash) = read_config(&root, &entry.config)?;
     let simulated = manifest.system.simulated;
     let start = Start::new(
         manifest.system.clone(),
@@ -152,29 +144,21 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
 
     let node = SharedNode::open(S::NAME, &run_dir, simulated)?;
     let listener = node.listener(S::NAME)?;
-    let context = StepContext::new(S::NAME, incarnation);
-    context.now.set(monotonic_ns());
     let heartbeat = Duration::from_millis(u64::from(entry.heartbeat_ms.max(30))) / 3;
     let period_ns = if entry.tick_hz > 0.0 { (1e9 / entry.tick_hz) as u64 } else { u64::MAX };
-    let mut ports = Ports {
-        bus: BusKind::Shared(Rc::clone(&node)),
-        service: S::NAME.to_owned(),
-        manifest: Rc::new(manifest),
-        context: Rc::clone(&context),
-        inputs: Vec::new(),
-        outputs: Vec::new(),
-        opened: Vec::new(),
-        forgotten: Vec::new(),
+    let mut ports = Ports::new(
+        BusKind::Shared(Rc::clone(&node)),
+        Rc::new(manifest),
+        S::NAME,
+        (incarnation, monotonic_ns()),
+        variable(env::RETAINED).unwrap_or_default().split(',').map(str::to_owned).collect(),
         devices,
-        retained: variable(env::RETAINED).unwrap_or_default().split(',').map(str::to_owned).collect(),
-    };
-    let mut journal = Journal::open(&mut ports, S::NAME)?;
-    let mut service = S::start(config, &mut ports, &start)?;
-    ports.check_all_opened()?;
-    journal.begin(&start, config_hash, &context);
+    );
+    let mut health = HealthReport::open(&mut ports)?;
+    let mut instance = Instance::<S>::start(config, config_hash, ports, &start)?;
     notifier.say("READY=1");
     tracing::info!("{} ready (start {incarnation})", S::NAME);
-    for topic in &ports.forgotten {
+    for topic in &instance.ports().forgotten {
         tracing::warn!("{}: the keeper did not answer: started without its memory of {topic}", S::NAME);
     }
 
@@ -194,19 +178,18 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
             } else if period_ns == u64::MAX {
                 next_tick = u64::MAX;
             }
-            context.now.set(now);
-            service.step(now);
-            journal.step(now, &ports, monotonic_ns() - now, lateness);
+            instance.step(now);
+            health.step(monotonic_ns() - now, lateness);
         }
         if now >= next_heartbeat {
             next_heartbeat = now + heartbeat.as_nanos() as u64;
             let mut text = Text::<96>::default();
-            if !ports.forgotten.is_empty() {
+            if !instance.ports().forgotten.is_empty() {
                 // What does not fit behind it is cut.
                 let _ = text.write_str("WITHOUT ITS MEMORY: ");
             }
-            service.status(&mut text);
-            let missed = journal.report(now, &text, service.refused(), &ports);
+            instance.service().status(&mut text);
+            let missed = health.publish(now, &text, &instance);
             notifier.beat(&text, missed);
             node.serve_late_joiners();
         }
@@ -214,99 +197,6 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
     notifier.say("STOPPING=1");
     tracing::info!("{} stopped", S::NAME);
     Ok(())
-}
-
-/// `trace/<service>` and `health/<service>`.
-struct Journal {
-    trace: Output<Trace>,
-    health: Output<Health>,
-    step: u64,
-    seed: u64,
-    config: u64,
-    plan: u64,
-    longest: u64,
-    total: u64,
-    counted: u64,
-    lateness: u64,
-}
-
-impl Journal {
-    fn open(ports: &mut Ports, name: &str) -> Result<Self, StartError> {
-        Ok(Self {
-            trace: ports.output_of(&format!("{}/{name}", Trace::TOPIC))?,
-            health: ports.output_of(&format!("{}/{name}", Health::TOPIC))?,
-            step: 0,
-            seed: 0,
-            config: 0,
-            plan: 0,
-            longest: 0,
-            total: 0,
-            counted: 0,
-            lateness: 0,
-        })
-    }
-
-    fn begin(&mut self, start: &Start, config: u64, context: &StepContext) {
-        self.seed = start.seed;
-        self.config = config;
-        self.plan = start.plan_hash.get();
-        if let Some(mut loan) = self.trace.loan() {
-            *loan = Trace {
-                now_ns: context.now.get(),
-                seed: self.seed,
-                config: self.config,
-                plan: self.plan,
-                ..Trace::default()
-            };
-            loan.send();
-        }
-    }
-
-    fn step(&mut self, now: u64, ports: &Ports, took: u64, lateness: u64) {
-        self.step += 1;
-        self.longest = self.longest.max(took);
-        self.total += took;
-        self.counted += 1;
-        self.lateness = self.lateness.max(lateness);
-        let Some(mut loan) = self.trace.loan() else { return };
-        let trace: &mut Trace = &mut loan;
-        trace.step = self.step;
-        trace.now_ns = now;
-        trace.seed = self.seed;
-        trace.config = self.config;
-        trace.plan = self.plan;
-        trace.ports = ports.inputs.len().min(MAX_PORTS) as u32;
-        trace.reserved = 0;
-        for (slot, input) in trace.drained.iter_mut().zip(&ports.inputs) {
-            *slot = input.drain();
-        }
-        loan.send();
-    }
-
-    /// Answers how many deadlines were missed.
-    fn report(&mut self, now: u64, text: &Text<96>, refused: u64, ports: &Ports) -> u64 {
-        for output in &ports.outputs {
-            output.watch(now);
-        }
-        let missed = ports.outputs.iter().map(|output| output.missed()).sum();
-        let health = Health {
-            steps: self.step,
-            lost: ports.inputs.iter().map(|input| input.lost()).sum(),
-            refused,
-            unheard: ports.inputs.iter().map(|input| input.failures()).sum(),
-            unsent: ports.outputs.iter().map(|output| output.unsent()).sum(),
-            missed,
-            longest_step_ns: self.longest,
-            mean_step_ns: self.total / self.counted.max(1),
-            lateness_ns: self.lateness,
-            pid: std::process::id(),
-            status: *text,
-            ..Health::default()
-        };
-        self.health.publish(&health);
-        (self.longest, self.total, self.counted, self.lateness) = (0, 0, 0, 0);
-        missed
-    }
 }
 
 /// Ports of a program beside the services: the command line, a scorer, a test.
@@ -323,20 +213,14 @@ impl Tool {
     /// When the manifest or the shared memory refuses.
     pub fn join(name: &str, manifest: Manifest, run_dir: &RunDir) -> Result<Self, StartError> {
         let node = SharedNode::open(name, run_dir, true)?;
-        let context = StepContext::new(name, std::process::id());
-        context.now.set(monotonic_ns());
-        let ports = Ports {
-            bus: BusKind::Shared(Rc::clone(&node)),
-            service: name.to_owned(),
-            manifest: Rc::new(manifest),
-            context,
-            inputs: Vec::new(),
-            outputs: Vec::new(),
-            opened: Vec::new(),
-            forgotten: Vec::new(),
-            devices: Box::new(crate::NoDevices),
-            retained: Vec::new(),
-        };
+        let ports = Ports::new(
+            BusKind::Shared(Rc::clone(&node)),
+            Rc::new(manifest),
+            name,
+            (std::process::id(), monotonic_ns()),
+            Vec::new(),
+            Box::new(crate::NoDevices),
+        );
         Ok(Self { ports, node })
     }
 

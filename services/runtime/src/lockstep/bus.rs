@@ -1,5 +1,6 @@
 //! The lockstep bus: queues in one process, on a simulated clock.
 
+use super::feed::Feed;
 use crate::device::{ByteDevice, MemoryDevice};
 use crate::port::Limits;
 use crate::{Start, mix_seed};
@@ -21,9 +22,9 @@ const DELAY_LATE_NS: u64 = 6_000_000;
 const PUBLISHERS: usize = 4;
 
 /// One message waiting in one input.
-struct Waiting<T> {
-    visible_ns: u64,
-    slot: Rc<T>,
+pub(super) struct Waiting<T> {
+    pub(super) visible_ns: u64,
+    pub(super) slot: Rc<T>,
 }
 
 /// Seeded delays of one input: most messages are quick, a few are late. Each input draws its own, so that who else listens
@@ -43,13 +44,29 @@ impl Delays {
     }
 }
 
-struct Queue<T> {
-    waiting: RefCell<VecDeque<Waiting<T>>>,
+pub(super) struct Queue<T> {
+    pub(super) waiting: RefCell<VecDeque<Waiting<T>>>,
     depth: usize,
     delays: Delays,
-    /// The service that reads, and whether it is to be woken.
-    wakes: Option<String>,
     closed: Cell<bool>,
+}
+
+/// What the scheduler needs to know of an input that wakes its service, without knowing its type.
+trait Waking {
+    /// When the next message becomes visible, if any is still waiting after `now`.
+    fn next_wake(&self, now: u64) -> u64;
+    fn is_closed(&self) -> bool;
+}
+
+impl<T> Waking for Queue<T> {
+    fn next_wake(&self, now: u64) -> u64 {
+        let waiting = self.waiting.borrow();
+        waiting.iter().map(|waiting| waiting.visible_ns).find(|visible| *visible > now).unwrap_or(u64::MAX)
+    }
+
+    fn is_closed(&self) -> bool {
+        self.closed.get()
+    }
 }
 
 struct Topic<T> {
@@ -62,10 +79,8 @@ struct Topic<T> {
     kept: RefCell<Option<Rc<T>>>,
 }
 
-/// What the scheduler needs to know of a topic without knowing its type.
+/// What the bus needs to know of a topic without knowing its type.
 trait AnyTopic {
-    /// When the next message becomes visible that wakes `service`, if any is still waiting after `now`.
-    fn next_wake(&self, service: &str, now: u64) -> u64;
     /// Fills the pool so that no later loan allocates.
     fn fill_pool(&self);
     fn publisher_died(&self, publisher: u32);
@@ -74,20 +89,6 @@ trait AnyTopic {
 }
 
 impl<T: Message> AnyTopic for Topic<T> {
-    fn next_wake(&self, service: &str, now: u64) -> u64 {
-        let readers = self.readers.borrow();
-        let mut next = u64::MAX;
-        for queue in readers.iter().filter(|queue| queue.wakes.as_deref() == Some(service)) {
-            for waiting in queue.waiting.borrow().iter() {
-                if waiting.visible_ns > now {
-                    next = next.min(waiting.visible_ns);
-                    break;
-                }
-            }
-        }
-        next
-    }
-
     fn fill_pool(&self) {
         let limits = Limits::of::<T>();
         let readers = self.readers.borrow();
@@ -120,14 +121,33 @@ type Wires = RefCell<HashMap<String, MemoryDevice>>;
 
 pub(crate) struct Bus {
     topics: RefCell<Vec<(String, Rc<dyn AnyTopic>)>>,
+    /// The inputs that wake a service, with its name: few among many, and looked through after every step.
+    waking: RefCell<Vec<(String, Rc<dyn Waking>)>>,
     wires: Wires,
     seed: u64,
     now: Cell<u64>,
+    /// Where a service that is run again gets its messages from, in place of the topics.
+    feed: Option<Feed>,
 }
 
 impl Bus {
     pub(crate) fn new(seed: u64) -> Rc<Self> {
-        Rc::new(Self { topics: RefCell::default(), wires: RefCell::default(), seed, now: Cell::new(0) })
+        Self::with_feed(seed, None)
+    }
+
+    pub(super) fn with_feed(seed: u64, feed: Option<Feed>) -> Rc<Self> {
+        Rc::new(Self {
+            topics: RefCell::default(),
+            waking: RefCell::default(),
+            wires: RefCell::default(),
+            seed,
+            now: Cell::new(0),
+            feed,
+        })
+    }
+
+    pub(super) fn feed(&self) -> Option<&Feed> {
+        self.feed.as_ref()
     }
 
     pub(crate) fn set_now(&self, now: u64) {
@@ -167,9 +187,15 @@ impl Bus {
             waiting: RefCell::new(VecDeque::with_capacity(depth + 1)),
             depth,
             delays: Delays { seed: mix_seed(topic_seed, self.now.get()), drawn: Cell::new(0) },
-            wakes: wake.then(|| service.to_owned()),
             closed: Cell::new(false),
         });
+        if let Some(feed) = self.feed.as_ref().filter(|feed| feed.is_of(service)) {
+            feed.attach(Rc::clone(&queue));
+            return LockstepInput { queue, bus: Rc::clone(self) };
+        }
+        if wake {
+            self.waking.borrow_mut().push((service.to_owned(), Rc::clone(&queue) as Rc<dyn Waking>));
+        }
         let mut visible_ns = 0;
         for newest in topic.newest.borrow().iter() {
             visible_ns = visible_ns.max(self.now.get() + queue.delays.draw_ns());
@@ -208,7 +234,9 @@ impl Bus {
     }
 
     pub(crate) fn next_wake(&self, service: &str, now: u64) -> u64 {
-        self.topics.borrow().iter().map(|(_, topic)| topic.next_wake(service, now)).min().unwrap_or(u64::MAX)
+        let waking = self.waking.borrow();
+        let own = waking.iter().filter(|(woken, _)| woken == service);
+        own.map(|(_, queue)| queue.next_wake(now)).min().unwrap_or(u64::MAX)
     }
 
     /// A service died: late joiners get nothing from it any more, and its queues are gone.
@@ -217,6 +245,12 @@ impl Bus {
             topic.publisher_died(publisher);
             topic.forget_closed_readers();
         }
+        self.waking.borrow_mut().retain(|(_, queue)| !queue.is_closed());
+    }
+
+    /// Has the keeper hold a message.
+    pub(super) fn keep<T: Message>(&self, slot: Rc<T>) {
+        *self.topic::<T>(T::TOPIC).kept.borrow_mut() = Some(slot);
     }
 }
 
@@ -252,6 +286,10 @@ impl<T: Message> Clone for LockstepOutput<T> {
 }
 
 impl<T: Message> LockstepOutput<T> {
+    pub(crate) fn has_readers(&self) -> bool {
+        self.topic.readers.borrow().iter().any(|queue| !queue.closed.get())
+    }
+
     /// Takes a slot that nobody else holds out of the pool.
     pub(crate) fn loan(&self) -> Option<Rc<T>> {
         let mut pool = self.topic.pool.borrow_mut();

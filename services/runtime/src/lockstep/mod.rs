@@ -1,10 +1,16 @@
 //! All services in one process on a simulated clock.
 
 pub(crate) mod bus;
+mod feed;
+mod replay;
 
+pub use replay::Replay;
+
+use crate::config::read_config;
 use crate::device::NoDevices;
-use crate::port::{BusKind, StepContext};
-use crate::{Cache, Ports, Service, Start, StartError, mix_seed, parse_config};
+use crate::port::StepContext;
+use crate::ports::BusKind;
+use crate::{Cache, Instance, Ports, Service, Start, StartError, mix_seed, name_hash};
 use bus::Bus;
 use manifest::Manifest;
 use std::path::{Path, PathBuf};
@@ -17,22 +23,21 @@ trait AnyService {
     fn status(&self, text: &mut ipc_types::Text<96>);
 }
 
-impl<S: Service> AnyService for S {
+impl<S: Service> AnyService for Instance<S> {
     fn step(&mut self, now: u64) {
-        Service::step(self, now);
+        Instance::step(self, now);
     }
     fn refused(&self) -> u64 {
-        Service::refused(self)
+        self.service().refused()
     }
     fn status(&self, text: &mut ipc_types::Text<96>) {
-        Service::status(self, text);
+        self.service().status(text);
     }
 }
 
 struct Running {
     name: &'static str,
     service: Box<dyn AnyService>,
-    context: Rc<StepContext>,
     period_ns: u64,
     next_tick: u64,
     next_wake: u64,
@@ -102,8 +107,8 @@ impl Lockstep {
     /// # Errors
     /// As the service's own start.
     pub fn add<S: Service + 'static>(&mut self) -> Result<(), StartError> {
-        let config = self.config::<S>()?;
-        self.add_with::<S>(config)
+        let (config, hash) = read_config(&self.root, &self.entry(S::NAME)?.config)?;
+        self.launch::<S>(config, hash)
     }
 
     /// The configuration of a service as the manifest's file gives it.
@@ -111,14 +116,7 @@ impl Lockstep {
     /// # Errors
     /// When the file is missing or wrong.
     pub fn config<S: Service>(&self) -> Result<S::Config, StartError> {
-        let entry = self.entry(S::NAME)?;
-        if entry.config.is_empty() {
-            return Ok(S::Config::default());
-        }
-        let path = self.root.join(&entry.config);
-        let text = std::fs::read_to_string(&path)
-            .map_err(|reason| StartError::Read { path: path.display().to_string(), reason })?;
-        Ok(parse_config(&entry.config, &text)?)
+        Ok(read_config(&self.root, &self.entry(S::NAME)?.config)?.0)
     }
 
     fn entry(&self, name: &str) -> Result<&manifest::ServiceEntry, StartError> {
@@ -133,6 +131,14 @@ impl Lockstep {
     /// # Errors
     /// As the service's own start.
     pub fn add_with<S: Service + 'static>(&mut self, config: S::Config) -> Result<(), StartError> {
+        self.launch::<S>(config, 0)
+    }
+
+    fn launch<S: Service + 'static>(
+        &mut self,
+        config: S::Config,
+        config_hash: u64,
+    ) -> Result<(), StartError> {
         let entry = self.entry(S::NAME)?;
         let period_ns = if entry.tick_hz > 0.0 { (1e9 / entry.tick_hz) as u64 } else { u64::MAX };
         let incarnation = match self.incarnations.iter_mut().find(|(name, _)| *name == S::NAME) {
@@ -153,9 +159,8 @@ impl Lockstep {
             true,
             self.cache.clone(),
         )?;
-        let mut ports = self.ports(S::NAME, incarnation);
-        let service = S::start(config, &mut ports, &start)?;
-        ports.check_all_opened()?;
+        let ports = self.ports(S::NAME, incarnation);
+        let instance = Instance::<S>::start(config, config_hash, ports, &start)?;
         // The first tick of each service falls somewhere within its first period.
         let phase = if period_ns == u64::MAX {
             u64::MAX
@@ -164,8 +169,7 @@ impl Lockstep {
         };
         self.services.push(Running {
             name: S::NAME,
-            service: Box::new(service),
-            context: ports.context,
+            service: Box::new(instance),
             period_ns,
             next_tick: phase,
             next_wake: u64::MAX,
@@ -174,24 +178,18 @@ impl Lockstep {
     }
 
     fn ports(&self, name: &str, incarnation: u32) -> Ports {
-        let context = StepContext::new(name, incarnation);
-        context.now.set(self.now);
         let retained = match self.manifest.services.get(name) {
             Some(entry) if incarnation > 0 => entry.retained().map(str::to_owned).collect(),
             _ => Vec::new(),
         };
-        Ports {
-            bus: BusKind::Lockstep(Rc::clone(&self.bus)),
-            service: name.to_owned(),
-            manifest: Rc::clone(&self.manifest),
-            context,
-            inputs: Vec::new(),
-            outputs: Vec::new(),
-            opened: Vec::new(),
-            forgotten: Vec::new(),
-            devices: Box::new(NoDevices),
+        Ports::new(
+            BusKind::Lockstep(Rc::clone(&self.bus)),
+            Rc::clone(&self.manifest),
+            name,
+            (incarnation, self.now),
             retained,
-        }
+            Box::new(NoDevices),
+        )
     }
 
     /// Ports for a program beside the services: a scorer, a test, the command line.
@@ -205,7 +203,7 @@ impl Lockstep {
     /// published last on its retained topics.
     pub fn kill(&mut self, name: &str) {
         self.services.retain(|running| running.name != name);
-        self.bus.died(StepContext::publisher_of(name));
+        self.bus.died(name_hash(name));
     }
 
     /// Messages refused by a service because they made no sense; 0 for one that does not run.
@@ -265,7 +263,6 @@ impl Lockstep {
             let raster = running.next_tick - running.next_tick % running.period_ns + running.period_ns;
             running.next_tick = raster + lateness.min(running.period_ns / 4);
         }
-        running.context.now.set(self.now);
         (self.watch)(Some(running.name));
         running.service.step(self.now);
         (self.watch)(None);
