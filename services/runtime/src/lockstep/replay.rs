@@ -8,7 +8,6 @@ use crate::{Cache, Instance, Ports, Service, Start, StartError};
 use ipc_types::{Message, Run, Trace};
 use manifest::Manifest;
 use std::cell::RefCell;
-use std::marker::PhantomData;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -16,24 +15,23 @@ use std::rc::Rc;
 /// gets the messages that it is handed and no others; what it sends reaches those who listen, at once.
 ///
 /// What came from a device stands in no journal: devices are there and silent.
-pub struct Replay<S: Service> {
+pub struct Replay {
     bus: Rc<Bus>,
     manifest: Rc<Manifest>,
     /// Topics of which the keeper holds something.
     kept: RefCell<Vec<String>>,
-    service: PhantomData<S>,
 }
 
 /// All that was sent is visible at this time, however long it was on its way.
 const LATE_NS: u64 = u64::MAX / 2;
 
-impl<S: Service> Replay<S> {
-    /// Nothing runs yet.
+impl Replay {
+    /// A bus for the service called `service`; nothing runs yet.
     #[must_use]
-    pub fn new(manifest: Manifest) -> Self {
-        let bus = Bus::with_feed(0, Some(Feed::new(S::NAME)));
+    pub fn new(manifest: Manifest, service: &str) -> Self {
+        let bus = Bus::with_feed(0, Some(Feed::new(service)));
         bus.set_now(LATE_NS);
-        Self { bus, manifest: Rc::new(manifest), kept: RefCell::default(), service: PhantomData }
+        Self { bus, manifest: Rc::new(manifest), kept: RefCell::default() }
     }
 
     /// Hands over a message of a [`Run`] with the header that it has; before the start for what the start took. False
@@ -55,21 +53,25 @@ impl<S: Service> Replay<S> {
     /// start from.
     ///
     /// # Errors
-    /// As the service's own start; also when a message that the start took belongs to no input of the service.
-    pub fn start(
+    /// As the service's own start; also when this bus is for another service, or a message that the start took belongs
+    /// to no input of the service.
+    pub fn start<S: Service>(
         &self,
         config: S::Config,
         root: &Path,
         cache: Cache,
         entry: &Trace,
     ) -> Result<Instance<S>, StartError> {
+        let Some(feed) = self.bus.feed().filter(|feed| feed.is_of(S::NAME)) else {
+            return Err(StartError::Invalid(format!("this replay is not one of {}", S::NAME)));
+        };
         let incarnation = entry.header.incarnation;
         let system = self.manifest.system.clone();
         let simulated = system.simulated;
         let start = Start::new(system, root, entry.seed, incarnation, simulated, cache)?;
         let ports = self.ports(S::NAME, incarnation, entry.now_ns, self.kept.take());
         let instance = Instance::start(config, entry.config, ports, &start)?;
-        if self.bus.feed().is_some_and(Feed::is_placed) {
+        if feed.is_placed() {
             Ok(instance)
         } else {
             Err(StartError::Invalid(format!("{}: its journal names inputs that it does not have", S::NAME)))
