@@ -18,6 +18,7 @@ vehicle = "vehicles/watchman.toml"
 simulated = true
 [service.odometer]
 run = "odometer"
+tick_hz = 100
 publishes.'localization/pose' = { hz = 100 }
 [service.mixer]
 run = "mixer"
@@ -249,17 +250,19 @@ fn what_ran_on_shared_memory_does_the_same_again_in_lockstep() {
             // It is taken when the turn before is over. A turn is at most seven poses, and the listener has room for
             // sixteen.
             turn.send(number).unwrap();
-            for _ in 0..3 {
+            // At times it misses a turn, and what has no room.
+            for _ in 0..if number % 10 == 0 { 0 } else { 3 } {
                 mixer.step(runtime::monotonic_ns());
                 recording.hear();
             }
+            recording.hear();
         }
         drop(turn);
         speaker.join().unwrap();
         mixer.step(runtime::monotonic_ns());
         recording.hear();
         let journal = recording.journal("mixer", std::process::id());
-        assert_eq!(journal.len(), 1202);
+        assert!(journal.len() == 1082 && has_gap(&journal));
         check(&recording, &journal);
     }
     drop(holder);
