@@ -60,19 +60,17 @@ impl Taken {
             return;
         }
         let mut runs = self.runs.borrow_mut();
-        if cursor.step.get() == self.now() {
-            match runs.get_mut(cursor.place.get()) {
-                Some(run) if continues(run, header) => {
-                    run.count += 1;
-                    return;
-                }
-                Some(_) => {}
-                // Had a later message a place and an earlier one none, the order would be wrong without a word.
-                None => return self.truncate(),
-            }
+        if cursor.step.get() == self.now()
+            && let Some(run) = runs.get_mut(cursor.place.get())
+            && continues(run, header)
+        {
+            run.count += 1;
+            return;
         }
-        cursor.step.set(self.now());
+        // Also when there is no place any more: a later message that continued an earlier run, with one between them that
+        // found none, would make the order wrong without a word.
         let place = self.used.get();
+        cursor.step.set(self.now());
         cursor.place.set(place);
         let Some(run) = runs.get_mut(place) else { return self.truncate() };
         *run = Run {
