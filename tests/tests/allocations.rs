@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use cli::flight::{Flight, Setup};
-use ipc_types::{PatrolState, Phase, Verb};
+use ipc_types::{PatrolState, Phase, Trace, Verb};
 use sereno_tests::checkout;
 use sereno_tests::counting::{Allocation, Noting, noted, watch};
 use std::collections::BTreeMap;
@@ -86,6 +86,10 @@ fn watch_round(vehicle: &str, watched_s: u64, seen: f32) {
         steps.store(0, Ordering::Relaxed);
     }
     let mut flight = Flight::start(&setup(vehicle), 1).unwrap();
+    // Journals are written where somebody reads them; that the oldest entries are dropped is nothing to the writers.
+    let mut ports = flight.bus.tool("cli");
+    let _journals =
+        CRITICAL.map(|(service, _)| ports.input_of::<Trace>(&format!("trace/{service}")).unwrap());
     flight.run_for(6.0);
     flight.order(Verb::PatrolStart, f32::NAN, f32::NAN);
     fly_until(&mut flight, |flight| matches!(phase(flight), Some(Phase::Hover | Phase::Autonomous)));
