@@ -92,6 +92,7 @@ impl Child {
             .env(env::INCARNATION, self.life.incarnation().to_string())
             .env(env::RETAINED, self.retained.join(","))
             .env(env::SUPERVISED, &around.run_dir)
+            .env(env::SERVICE, &self.entry.name)
             .env("NOTIFY_SOCKET", &around.notify)
             .env("WATCHDOG_USEC", heartbeat_us.to_string())
             .stdin(Stdio::null())
@@ -218,7 +219,7 @@ fn niceness(priority: u8) -> i32 {
     -(i32::from(priority) * 19).div_euclid(99)
 }
 
-fn end_words(status: ExitStatus) -> String {
+pub(crate) fn end_words(status: ExitStatus) -> String {
     match (status.code(), status.signal()) {
         (Some(code), _) => format!("exit code {code}"),
         (_, Some(signal)) => match Signal::from_named_raw(signal) {

@@ -51,6 +51,8 @@ pub struct Overview {
     pub airborne: bool,
     /// running, landing or stopping.
     pub phase: String,
+    /// Process id of the warden, which lands the aircraft should the supervisor die; absent while one is being started.
+    pub warden: Option<u32>,
     /// In the order of start.
     pub services: Vec<ServiceRow>,
 }
@@ -99,7 +101,9 @@ impl Client {
     /// As [`Client::ask`].
     pub fn ps(&mut self) -> Result<Overview, ClientError> {
         match self.ask(&Request::Ps)? {
-            Response::Services { airborne, phase, services } => Ok(Overview { airborne, phase, services }),
+            Response::Services { airborne, phase, warden, services } => {
+                Ok(Overview { airborne, phase, warden, services })
+            }
             other => Err(ClientError::Nonsense(format!("{other:?}"))),
         }
     }

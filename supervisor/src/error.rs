@@ -8,14 +8,17 @@ pub enum SupervisorError {
     /// The manifest is missing, wrong or does not hold together.
     #[error("{0}")]
     Manifest(String),
-    /// Another supervisor is at work.
-    #[error("{}: already in use by the supervisor with process id {holder}", .run_dir.display())]
+    /// Another supervisor is at work, or the warden of one that died.
+    #[error("{}: already in use by {holder}", .run_dir.display())]
     AlreadyRunning {
         /// The contested run directory.
         run_dir: PathBuf,
-        /// Process id as the holder wrote it.
+        /// Who, with the process id and what goes on, as the holder wrote it.
         holder: String,
     },
+    /// Nobody would land the aircraft if the supervisor died.
+    #[error("cannot start the warden, which is to land the aircraft should the supervisor die: {0}")]
+    Warden(String),
     /// A run directory that others can read or that is somebody else's.
     #[error("{}: {reason}", .run_dir.display())]
     RunDir {

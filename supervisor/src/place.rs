@@ -1,4 +1,4 @@
-//! The run directory: private, locked by one supervisor, empty again in the end.
+//! The run directory: private, locked by one supervisor and its warden, empty again in the end.
 
 use crate::error::{SupervisorError, while_doing};
 use manifest::Manifest;
@@ -6,8 +6,9 @@ use runtime::shm::RunDir;
 use rustix::fs::{FlockOperation, flock};
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs::{File, OpenOptions};
-use std::io::{Read, Write};
-use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::io::Read;
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -27,8 +28,8 @@ pub(crate) struct Place {
     pub(crate) run: RunDir,
     logs: PathBuf,
     logs_stay: bool,
-    /// Holds the lock for as long as it is open.
-    _lock: File,
+    /// Holds the lock for as long as it is open, here or in another process that was given it.
+    lock: File,
 }
 
 impl Place {
@@ -64,10 +65,27 @@ impl Place {
         for socket in [control_socket(&path), path.join("notify.sock")] {
             remove(&socket);
         }
+        let place = Self::inherit(run, logs, lock);
+        std::fs::create_dir_all(&place.logs).map_err(while_doing(place.logs.display().to_string()))?;
+        Ok(place)
+    }
+
+    /// The run directory of another process that gave this one its lock.
+    pub(crate) fn inherit(run: RunDir, logs: Option<&Path>, lock: File) -> Self {
         let logs_stay = logs.is_some();
-        let logs = logs.map_or_else(|| path.join("logs"), Path::to_owned);
-        std::fs::create_dir_all(&logs).map_err(while_doing(logs.display().to_string()))?;
-        Ok(Self { run, logs, logs_stay, _lock: lock })
+        let logs = logs.map_or_else(|| run.path().join("logs"), Path::to_owned);
+        Self { run, logs, logs_stay, lock }
+    }
+
+    /// The lock, to be given to another process.
+    pub(crate) fn lock(&self) -> BorrowedFd<'_> {
+        self.lock.as_fd()
+    }
+
+    /// Changes what whoever wants the directory is told of its holder.
+    pub(crate) fn held_by(&self, holder: &str) {
+        // The lock counts, not what is written in it.
+        let _ = write_holder(&self.lock, holder);
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -135,7 +153,7 @@ fn take_lock(run_dir: &Path) -> Result<File, SupervisorError> {
                 let holder = holder.trim();
                 return Err(SupervisorError::AlreadyRunning {
                     run_dir: run_dir.to_owned(),
-                    holder: if holder.is_empty() { "unknown".to_owned() } else { holder.to_owned() },
+                    holder: if holder.is_empty() { "a supervisor" } else { holder }.to_owned(),
                 });
             }
             Err(error) => return Err(while_doing(doing())(error)),
@@ -147,10 +165,16 @@ fn take_lock(run_dir: &Path) -> Result<File, SupervisorError> {
         if !same.unwrap_or(false) {
             continue;
         }
-        file.set_len(0).map_err(while_doing(doing()))?;
-        writeln!(file, "{}", std::process::id()).map_err(while_doing(doing()))?;
+        let holder = format!("the supervisor with process id {}", std::process::id());
+        write_holder(&file, &holder).map_err(while_doing(doing()))?;
         return Ok(file);
     }
+}
+
+fn write_holder(lock: &File, holder: &str) -> std::io::Result<()> {
+    let line = format!("{holder}\n");
+    lock.write_all_at(line.as_bytes(), 0)?;
+    lock.set_len(line.len() as u64)
 }
 
 /// Services that outlived their supervisor hold shared memory that is about to be wiped.
@@ -162,10 +186,10 @@ fn end_orphans(run_dir: &Path) -> Result<(), SupervisorError> {
             return Ok(());
         }
         if Instant::now() >= deadline {
-            let pids: Vec<String> = orphans.iter().map(|p| p.as_raw_pid().to_string()).collect();
+            let pids: Vec<String> = orphans.iter().map(|(pid, _)| pid.as_raw_pid().to_string()).collect();
             return Err(SupervisorError::Orphans { run_dir: run_dir.to_owned(), pids: pids.join(", ") });
         }
-        for pid in orphans {
+        for (pid, _) in orphans {
             // Gone already is as good.
             let _ = kill_process(pid, Signal::KILL);
         }
@@ -173,18 +197,25 @@ fn end_orphans(run_dir: &Path) -> Result<(), SupervisorError> {
     }
 }
 
-/// Processes that some supervisor of this run directory started, by their environment. A zombie has none.
-fn orphans(run_dir: &Path) -> Vec<Pid> {
+/// Processes that some supervisor of this run directory started, with the services they belong to, by their environment.
+/// A zombie has none.
+pub(crate) fn orphans(run_dir: &Path) -> Vec<(Pid, String)> {
     let mark = [runtime::env::SUPERVISED.as_bytes(), b"=", run_dir.as_os_str().as_encoded_bytes()].concat();
+    let name = [runtime::env::SERVICE.as_bytes(), b"="].concat();
     let own = std::process::id().cast_signed();
+    let service = |pid: i32| {
+        let environment = std::fs::read(format!("/proc/{pid}/environ")).ok()?;
+        let variables = || environment.split(|b| *b == 0);
+        if !variables().any(|variable| variable == mark) {
+            return None;
+        }
+        let name = variables().find_map(|variable| variable.strip_prefix(name.as_slice())).unwrap_or_default();
+        Some(String::from_utf8_lossy(name).into_owned())
+    };
     let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
     entries
         .filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok())
         .filter(|pid| *pid != own)
-        .filter(|pid| {
-            std::fs::read(format!("/proc/{pid}/environ"))
-                .is_ok_and(|environment| environment.split(|b| *b == 0).any(|variable| variable == mark))
-        })
-        .filter_map(Pid::from_raw)
+        .filter_map(|pid| Some((Pid::from_raw(pid)?, service(pid)?)))
         .collect()
 }

@@ -74,6 +74,9 @@ pub enum Response {
         airborne: bool,
         /// What the supervisor is doing: running, landing or stopping.
         phase: String,
+        /// Process id of the warden, when there is one.
+        #[serde(default)]
+        warden: Option<u32>,
         /// In the order of start.
         services: Vec<ServiceRow>,
     },

@@ -5,7 +5,16 @@ use ipc_types::{COMMAND_LIFE_NS, Command, Phase, Text, Verb};
 use manifest::Manifest;
 use runtime::shm::{Holder, RunDir};
 
-/// Shared memory as the supervisor needs it. Dropping it gives everything back.
+/// Which process it is that needs shared memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Creates and holds everything.
+    Supervisor,
+    /// Opens what it takes to land.
+    Warden,
+}
+
+/// Shared memory as the supervisor needs it, and its warden, who only looks and lands. Dropping it gives everything back.
 pub trait SharedMemory {
     /// Takes what was published on retained topics and serves those who join. Called every few milliseconds.
     fn keep(&mut self);
@@ -36,12 +45,16 @@ impl SharedMemory for NoSharedMemory {
     fn land(&mut self, _sequence: u32) {}
 }
 
-/// All topics, events and keeper channels of the manifest.
+/// All topics, events and keeper channels of the manifest; of the warden, two topics.
 pub(crate) struct Held(Holder);
 
 impl Held {
-    pub(crate) fn create(manifest: &Manifest, run_dir: &RunDir) -> Result<Self, SupervisorError> {
-        Holder::create(manifest, run_dir).map(Self).map_err(|e| SupervisorError::SharedMemory(e.to_string()))
+    pub(crate) fn of(part: Part, manifest: &Manifest, run_dir: &RunDir) -> Result<Self, SupervisorError> {
+        let holder = match part {
+            Part::Supervisor => Holder::create(manifest, run_dir),
+            Part::Warden => Holder::join("warden", manifest, run_dir),
+        };
+        holder.map(Self).map_err(|e| SupervisorError::SharedMemory(e.to_string()))
     }
 }
 

@@ -5,18 +5,20 @@ mod requests;
 use crate::child::{Child, Surroundings};
 use crate::control::Control;
 use crate::error::while_doing;
+use crate::landing::{Descent, Landing, order_number};
 use crate::life::{Action, Life};
 use crate::log::Log;
 use crate::notify::NotifySocket;
 use crate::place::Place;
 use crate::shared::SharedMemory;
+use crate::show::show;
 use crate::signals::SignalPipe;
-use crate::{Echo, Options, SupervisorError, default_run_dir};
+use crate::warden::Post;
+use crate::{Options, SupervisorError, default_run_dir};
 use manifest::Manifest;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::Signal;
 use signal_hook::consts::{SIGCHLD, SIGHUP, SIGINT, SIGTERM};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -24,13 +26,11 @@ use std::time::{Duration, Instant};
 const KEEP: Duration = Duration::from_millis(20);
 /// The same while a restarted service waits for what was kept: adds this much to the time it is away.
 const KEEP_STARTING: Duration = Duration::from_millis(2);
-/// How often dead programs beside the services are cleaned up after: a topic has places for four publishers, and
+/// How often dead programs beside the services are cleaned up after: a topic has places for five publishers, and
 /// people do not start and kill three command lines within a second.
 const TIDY: Duration = Duration::from_secs(1);
 /// A loop that overslept so long was stopped itself, and so probably was everybody else.
 const OVERSLEPT: Duration = Duration::from_millis(200);
-/// How often the order to land is repeated: the pilot may be restarting.
-const LAND_AGAIN: Duration = Duration::from_secs(1);
 /// Patience with each service when there is a hurry.
 const HURRY: Duration = Duration::from_millis(500);
 /// Ahead of every service: a restart must not wait for those that still run.
@@ -40,7 +40,7 @@ const NICENESS: i32 = -19;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Running,
-    Landing { until: Instant, again: Instant, order: u32 },
+    Landing(Landing),
     Stopping { hurry: bool },
 }
 
@@ -48,7 +48,7 @@ impl Phase {
     fn word(self) -> &'static str {
         match self {
             Self::Running => "running",
-            Self::Landing { .. } => "landing",
+            Self::Landing(_) => "landing",
             Self::Stopping { .. } => "stopping",
         }
     }
@@ -69,6 +69,7 @@ pub(crate) struct Supervisor<S> {
     started: Instant,
     child_ends: SignalPipe,
     stop_signals: SignalPipe,
+    warden: Post,
     place: Place,
 }
 
@@ -87,18 +88,18 @@ impl<S: SharedMemory> Supervisor<S> {
         // From here on a signal ends the system in order.
         let child_ends = SignalPipe::new(&[SIGCHLD])?;
         let stop_signals = SignalPipe::new(&[SIGTERM, SIGINT, SIGHUP])?;
+        let programs = match &options.programs {
+            Some(programs) => programs.clone(),
+            None => own_directory()?,
+        };
         let place = Place::take(&run_dir, options.logs.as_deref())?;
         let prepared = prepare(options, paths, &place, create);
-        let (shared, manifest, manifests, control, notify) = match prepared {
+        let (shared, manifest, manifests, control, notify, warden) = match prepared {
             Ok(prepared) => prepared,
             Err(error) => {
                 place.leave(&manifest);
                 return Err(error);
             }
-        };
-        let programs = match &options.programs {
-            Some(programs) => programs.clone(),
-            None => own_directory()?,
         };
         let now = Instant::now();
         let children = manifest.start_order().into_iter().map(|entry| {
@@ -127,6 +128,7 @@ impl<S: SharedMemory> Supervisor<S> {
             started: now,
             child_ends,
             stop_signals,
+            warden,
             place,
         })
     }
@@ -134,6 +136,9 @@ impl<S: SharedMemory> Supervisor<S> {
     /// Runs until nothing is left.
     pub(crate) fn run(mut self) -> Result<(), SupervisorError> {
         self.say(&format!("{} in {}", self.manifest.system.name, self.place.path().display()));
+        if let Some(pid) = self.warden.pid() {
+            self.say(&format!("warden: process {pid}"));
+        }
         let mut planned = Instant::now();
         let mut tidied = planned;
         loop {
@@ -160,7 +165,8 @@ impl<S: SharedMemory> Supervisor<S> {
             planned = self.wait()?;
         }
         self.say("stopped");
-        let Self { shared, control, notify, children, place, manifest, .. } = self;
+        let Self { shared, control, notify, children, warden, place, manifest, .. } = self;
+        warden.dismiss();
         drop((shared, notify, children));
         place.leave(&manifest);
         // The last thing that a client who waits for the end sees.
@@ -247,12 +253,14 @@ impl<S: SharedMemory> Supervisor<S> {
                 news.push(format!("{name}: {end}; {word}"));
             }
         }
+        news.extend(self.warden.reap(now));
         news.iter().for_each(|text| self.say(text));
     }
 
     /// Starts, ends and kills what is due.
     fn act(&mut self, now: Instant) {
         let mut news = Vec::new();
+        news.extend(self.warden.act(&self.place, &self.around.manifests, now));
         for child in &mut self.children {
             let name = &child.entry.name;
             match child.life.due(now) {
@@ -289,15 +297,13 @@ impl<S: SharedMemory> Supervisor<S> {
         self.phase = match self.phase {
             Phase::Running if self.shared.airborne() && !at_once => {
                 self.say("landing first; a second signal stops at once");
-                // Differs from every order before: the milliseconds of a clock that never goes back.
-                let order = (runtime::monotonic_ns() / 1_000_000) as u32;
-                Phase::Landing { until: now + self.options.land_limit, again: now, order }
+                Phase::Landing(Landing::new(self.options.land_limit, order_number(), now))
             }
             Phase::Running => {
                 self.say("stopping");
                 Phase::Stopping { hurry: at_once }
             }
-            Phase::Landing { .. } | Phase::Stopping { .. } => {
+            Phase::Landing(_) | Phase::Stopping { .. } => {
                 self.say("stopping at once");
                 Phase::Stopping { hurry: true }
             }
@@ -306,16 +312,12 @@ impl<S: SharedMemory> Supervisor<S> {
 
     /// Takes landing and stopping further. True when nothing is left.
     fn progress(&mut self, now: Instant) -> bool {
-        if let Phase::Landing { until, again, order } = self.phase {
-            if !self.shared.airborne() {
-                self.say("landed; stopping");
-                self.phase = Phase::Stopping { hurry: false };
-            } else if now >= until {
-                self.say("not landed in time; stopping all the same");
-                self.phase = Phase::Stopping { hurry: false };
-            } else if now >= again {
-                self.shared.land(order);
-                self.phase = Phase::Landing { until, again: now + LAND_AGAIN, order };
+        if let Phase::Landing(landing) = &mut self.phase {
+            match landing.due(self.shared.airborne(), now) {
+                Some(Descent::Order(order)) => self.shared.land(order),
+                Some(Descent::Landed) => self.stop_landed("landed; stopping"),
+                Some(Descent::Late) => self.stop_landed("not landed in time; stopping all the same"),
+                None => {}
             }
         }
         let Phase::Stopping { hurry } = self.phase else { return false };
@@ -333,6 +335,11 @@ impl<S: SharedMemory> Supervisor<S> {
         self.children.iter().all(|c| c.pid().is_none())
     }
 
+    fn stop_landed(&mut self, why: &str) {
+        self.say(why);
+        self.phase = Phase::Stopping { hurry: false };
+    }
+
     fn seconds(&self, now: Instant) -> f64 {
         now.saturating_duration_since(self.started).as_secs_f64()
     }
@@ -345,7 +352,7 @@ impl<S: SharedMemory> Supervisor<S> {
     }
 }
 
-type Prepared<S> = (S, Manifest, String, Control, NotifySocket);
+type Prepared<S> = (S, Manifest, String, Control, NotifySocket, Post);
 
 /// Everything that is made inside the run directory.
 fn prepare<S>(
@@ -363,7 +370,9 @@ fn prepare<S>(
     let shared = create(&manifest, &place.run)?;
     let control = Control::bind(&place.control())?;
     let notify = NotifySocket::bind(&place.notify())?;
-    Ok((shared, manifest, manifests, control, notify))
+    // Last, as whoever is there from now on ends in order.
+    let warden = Post::fill(place, &manifests)?;
+    Ok((shared, manifest, manifests, control, notify, warden))
 }
 
 /// The manifest and, for the services, the paths it was read from.
@@ -384,25 +393,4 @@ fn load(paths: &[PathBuf]) -> Result<(Manifest, String), SupervisorError> {
 fn own_directory() -> Result<PathBuf, SupervisorError> {
     let own = std::env::current_exe().map_err(while_doing("own executable"))?;
     Ok(own.parent().unwrap_or(Path::new("/")).to_owned())
-}
-
-/// A line for whoever started the system, unless nobody takes it now: a paused terminal must not pause a flight.
-fn show(echo: Echo, name: &str, line: &str) {
-    match echo {
-        Echo::Silent => {}
-        Echo::Text => print(&mut std::io::stderr().lock(), &format!("[{name}] {line}\n")),
-        Echo::Json => {
-            let row = serde_json::json!({ "service": name, "line": line });
-            print(&mut std::io::stdout().lock(), &format!("{row}\n"));
-        }
-    }
-}
-
-fn print(stream: &mut (impl Write + std::os::fd::AsFd), text: &str) {
-    let mut ready = [PollFd::new(stream, PollFlags::OUT)];
-    let at_once = Timespec { tv_sec: 0, tv_nsec: 0 };
-    if poll(&mut ready, Some(&at_once)) == Ok(1) {
-        // Nobody listens any more: the system runs on.
-        let _ = stream.write_all(text.as_bytes());
-    }
 }

@@ -9,7 +9,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 use supervisor::{ClientError, Echo, NoSharedMemory, Options, SupervisorError};
-use system::{LONG, System, alive, exists, kill, wait_until};
+use system::{LONG, System, exists, kill, wait_until};
 
 #[test]
 fn services_start_by_criticality_and_report() {
@@ -245,20 +245,6 @@ fn the_first_signal_lands_and_the_second_does_not_wait() {
 }
 
 #[test]
-fn services_die_with_their_supervisor_and_the_next_one_clears_up() {
-    let mut system = System::started(&[("a", "work", ""), ("shell", "sh:sleep 61", "")]);
-    let worker = system.wait_running("a");
-    let shell = system.row("shell").pid.unwrap();
-    system.signal(Signal::KILL);
-    let _ = system.ended();
-    wait_until("the service has died with it", || !alive(worker));
-    assert!(alive(shell), "a shell does not ask to die with its parent");
-    system.start();
-    system.wait_running("a");
-    assert!(!alive(shell), "so the next supervisor ended it");
-}
-
-#[test]
 fn what_cannot_run_is_said_in_one_sentence() {
     let system = System::of(&[("a", "work", "")]);
     let good = Options {
@@ -267,7 +253,7 @@ fn what_cannot_run_is_said_in_one_sentence() {
         ..Options::default()
     };
     let refusal = |options: &Options| {
-        let error: SupervisorError = supervisor::run_with(options, |_, _| Ok(NoSharedMemory)).unwrap_err();
+        let error: SupervisorError = supervisor::run_with(options, |_, _, _| Ok(NoSharedMemory)).unwrap_err();
         let text = error.to_string();
         assert!(!text.contains('\n'), "{text}");
         text

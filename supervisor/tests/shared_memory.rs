@@ -6,7 +6,7 @@ mod system;
 use runtime::shm::RunDir;
 use rustix::process::Signal;
 use std::process::{Command, Stdio};
-use system::{System, kill};
+use system::{System, alive, kill, wait_until};
 
 const TOPICS: &str =
     "publishes.'pilot/state' = { hz = 5, retained = true }\nsubscribes.'operator/command' = {}";
@@ -40,15 +40,35 @@ fn shared_memory_is_made_held_and_given_back() {
 }
 
 #[test]
-fn what_a_killed_supervisor_left_is_wiped_by_the_next() {
+fn what_a_killed_supervisor_left_is_wiped_by_its_warden() {
     let mut system = System::of(&[("pilot", "work", TOPICS)]);
     let run_dir = RunDir::new(system.run_dir());
     system.start_as(supervisor(&system));
-    system.wait_running("pilot");
+    let pid = system.wait_running("pilot");
     system.signal(Signal::KILL);
     let _ = system.ended();
-    assert!(!run_dir.leftovers().is_empty(), "nobody could tidy up");
+    wait_until("nothing is left", || !system.run_dir().exists());
+    assert!(!alive(pid));
+    assert_eq!(run_dir.leftovers(), Vec::<String>::new());
+}
+
+#[test]
+fn what_both_left_is_wiped_by_the_next() {
+    let mut system = System::of(&[("pilot", "work", TOPICS)]);
+    let run_dir = RunDir::new(system.run_dir());
     system.start_as(supervisor(&system));
+    let pid = system.wait_running("pilot");
+    let warden = system.client().ps().unwrap().warden.unwrap();
+    // Neither sees the other die.
+    kill(warden, Signal::STOP);
+    system.signal(Signal::KILL);
+    let _ = system.ended();
+    kill(warden, Signal::KILL);
+    wait_until("the warden has died too", || !alive(warden));
+    assert!(!run_dir.leftovers().is_empty(), "nobody could tidy up");
+    assert!(alive(pid), "nobody ended it: the known remainder");
+    system.start_as(supervisor(&system));
+    assert!(!alive(pid), "the next supervisor did");
     system.wait_running("pilot");
     system.signal(Signal::TERM);
     assert!(system.ended().success());

@@ -62,6 +62,10 @@ pub(crate) fn ps(place: &Place, json: bool) -> Result<ExitCode> {
     } else {
         print_rows(&overview.services);
         println!("{}, {}", overview.phase, if overview.airborne { "in the air" } else { "on the ground" });
+        match overview.warden {
+            Some(pid) => println!("warden: process {pid}"),
+            None => println!("warden: none now; the supervisor is starting another"),
+        }
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -29,8 +29,11 @@ pub mod env {
     pub const INCARNATION: &str = "SERENO_INCARNATION";
     /// Retained topics that the keeper offers to this start, separated by `,`.
     pub const RETAINED: &str = "SERENO_RETAINED";
-    /// Set while a supervisor watches: the service dies with it.
+    /// The run directory, for every service and whatever it starts: by this they are found again when their
+    /// supervisor has died. They live on then: its warden lands what flies, and ends them after that.
     pub const SUPERVISED: &str = "SERENO_SUPERVISED";
+    /// The service's name in the manifest.
+    pub const SERVICE: &str = "SERENO_SERVICE";
 }
 
 /// Now, nanoseconds of `CLOCK_MONOTONIC`.
@@ -42,7 +45,13 @@ pub fn monotonic_ns() -> u64 {
 
 /// Runs a service as this process until SIGTERM; the whole `main` of a service.
 pub fn main<S: Service>(devices: impl Devices + 'static) -> ExitCode {
-    tracing_subscriber::fmt().with_writer(std::io::stderr).with_target(false).without_time().init();
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_target(false)
+        .without_time()
+        // It would complain with `eprintln!`, which panics when the supervisor, who read the pipe, has died: in the air.
+        .log_internal_errors(false)
+        .init();
     let notifier = Notifier::from_environment();
     match run::<S>(Box::new(devices), &notifier) {
         Ok(()) => ExitCode::SUCCESS,
@@ -112,11 +121,6 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(StartError::invalid)?;
-    }
-    if variable(env::SUPERVISED).is_some() {
-        // Without its supervisor nobody would ever restart or stop this process.
-        rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))
-            .map_err(StartError::invalid)?;
     }
     let paths = variable(env::MANIFEST)
         .ok_or_else(|| StartError::Manifest(format!("{} is not set: which manifest?", env::MANIFEST)))?;

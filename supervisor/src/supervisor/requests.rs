@@ -41,6 +41,7 @@ impl<S: SharedMemory> Supervisor<S> {
             Request::Ps => Response::Services {
                 airborne: self.shared.airborne(),
                 phase: self.phase.word().to_owned(),
+                warden: self.warden.pid(),
                 services: self.children.iter().map(|child| child.row(now)).collect(),
             },
             Request::Logs { service, lines } if service == "supervisor" => {

@@ -1,7 +1,7 @@
 //! A supervised system of tiny services for tests: real processes, shared memory only where asked for.
 //!
 //! The test executable plays all the parts. Run with `--ignored --exact system::supervisor_process` it is a
-//! supervisor, with `system::child_process` a service.
+//! supervisor, or its warden, with `system::child_process` a service.
 
 #![allow(dead_code, reason = "every test file uses its part")]
 
@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use supervisor::protocol::ServiceRow;
-use supervisor::{Client, Options, SharedMemory};
+use supervisor::{Client, Options, Part, SharedMemory, SupervisorError};
 
 /// Nothing here takes long: whoever waits this long waits in vain.
 pub(crate) const LONG: Duration = Duration::from_secs(30);
@@ -51,9 +51,16 @@ fn supervisor_process() {
         run_dir: Some(dir.join("run")),
         programs: Some(dir.clone()),
         stop_limit: Duration::from_millis(500),
+        logs: std::env::var_os("TEST_LOGS").map(PathBuf::from),
         ..Options::default()
     };
-    if let Err(error) = supervisor::run_with(&options, |_, _| Ok(Pretended(dir.clone()))) {
+    let open = |part, _: &_, _: &_| {
+        if part == Part::Warden && dir.join("no-warden").exists() {
+            return Err(SupervisorError::SharedMemory("the test wants no warden".to_owned()));
+        }
+        Ok(Pretended(dir.clone()))
+    };
+    if let Err(error) = supervisor::run_with(&options, open) {
         eprintln!("{error}");
         std::process::exit(1);
     }
@@ -69,7 +76,6 @@ fn notify(text: &str) {
 #[ignore = "a service of the other tests"]
 fn child_process() {
     let Ok(part) = std::env::var("TEST_PART") else { return };
-    rustix::process::set_parent_process_death_signal(Some(Signal::KILL)).unwrap();
     let stop = Arc::new(AtomicBool::new(false));
     signal_hook::flag::register(signal_hook::consts::SIGTERM, Arc::clone(&stop)).unwrap();
     let start = std::env::var("SERENO_INCARNATION").unwrap();
@@ -141,7 +147,7 @@ impl System {
         self.path("run")
     }
 
-    fn supervisor_command(&self) -> Command {
+    pub(crate) fn supervisor_command(&self) -> Command {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command
             .args(["--ignored", "--exact", "system::supervisor_process", "--nocapture"])
@@ -156,11 +162,14 @@ impl System {
         self.start_as(self.supervisor_command());
     }
 
-    /// Starts a supervisor by a command of the test's own.
-    pub(crate) fn start_as(&mut self, mut command: Command) {
-        self.supervisor = Some(command.spawn().unwrap());
+    /// Starts a supervisor by a command of the test's own; its process id.
+    pub(crate) fn start_as(&mut self, mut command: Command) -> u32 {
+        let supervisor = command.spawn().unwrap();
+        let pid = supervisor.id();
+        self.supervisor = Some(supervisor);
         let run_dir = self.run_dir();
         wait_until("the supervisor answers", || Client::connect(&run_dir).is_ok());
+        pid
     }
 
     /// Runs one more supervisor to its end.
@@ -215,11 +224,36 @@ impl System {
 impl Drop for System {
     fn drop(&mut self) {
         if let Some(mut supervisor) = self.supervisor.take() {
-            // Its services die with it.
             let _ = supervisor.kill();
             let _ = supervisor.wait();
         }
+        // Neither a warden nor services outlive a test, however it ended.
+        let deadline = Instant::now() + LONG;
+        while Instant::now() < deadline {
+            let left = processes(&self.run_dir());
+            if left.is_empty() {
+                break;
+            }
+            for pid in left {
+                let _ = kill_process(Pid::from_raw(pid.cast_signed()).unwrap(), Signal::KILL);
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        runtime::shm::RunDir::new(self.run_dir()).wipe();
     }
+}
+
+/// Services and wardens of a run directory, and what they started, by their environment; whoever has ended has none.
+pub(crate) fn processes(run_dir: &Path) -> Vec<u32> {
+    let mark = format!("{}={}", runtime::env::RUN_DIR, run_dir.display());
+    let entries = std::fs::read_dir("/proc").unwrap().flatten();
+    entries
+        .filter_map(|entry| entry.file_name().to_str()?.parse().ok())
+        .filter(|pid: &u32| {
+            std::fs::read(format!("/proc/{pid}/environ"))
+                .is_ok_and(|all| all.split(|b| *b == 0).any(|variable| variable == mark.as_bytes()))
+        })
+        .collect()
 }
 
 pub(crate) fn wait_until(what: &str, mut done: impl FnMut() -> bool) {

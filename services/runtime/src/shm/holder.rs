@@ -24,6 +24,9 @@ impl From<StartError> for ShmError {
     }
 }
 
+/// Most publishers of one topic: of orders the supervisor, its warden and three programs at a time.
+const PUBLISHERS: usize = 5;
+
 /// A retained topic in the hands of the keeper.
 trait Keep {
     fn topic(&self) -> &str;
@@ -73,7 +76,8 @@ impl<T: Message> Keep for Kept<T> {
     }
 }
 
-/// Creates every topic, event and keeper channel of the manifest and holds them for as long as it lives.
+/// Creates every topic, event and keeper channel of the manifest and holds them for as long as it lives; or, for the
+/// supervisor's warden, only looks at the pilot and gives orders ([`Holder::join`]).
 pub struct Holder {
     kept: Vec<(String, Box<dyn Keep>)>,
     pilot_state: Option<SharedInput<PilotState>>,
@@ -97,7 +101,7 @@ fn create_topic<T: Message>(node: &SharedNode, name: &str) -> Result<Topic<T>, S
         .subscriber_max_borrowed_samples(limits.held)
         .history_size(1)
         .max_subscribers(limits.readers)
-        .max_publishers(4)
+        .max_publishers(PUBLISHERS)
         .max_nodes(MAX_NODES)
         .enable_safe_overflow(true)
         .create_with_attributes(&layout_attribute::<T>()?)
@@ -178,22 +182,35 @@ impl Holder {
                 kept.push((service.clone(), keep));
             }
         }
-        let has = |name: &str| manifest.topics().iter().any(|topic| topic.name == name);
+        Ok(Self { kept, held, ..Self::over(node, manifest)? })
+    }
+
+    /// Opens what it takes to see whether something flies and to land it, and holds nothing: what its creator leaves
+    /// behind stays until it is wiped.
+    ///
+    /// # Errors
+    /// Shared memory that refuses.
+    pub fn join(name: &str, manifest: &Manifest, run_dir: &RunDir) -> Result<Self, ShmError> {
+        Self::over(SharedNode::open(name, run_dir, true)?, manifest)
+    }
+
+    fn over(node: Rc<SharedNode>, manifest: &Manifest) -> Result<Self, ShmError> {
+        let topics = manifest.topics();
+        let has = |name: &str| topics.iter().any(|topic| topic.name == name);
         let pilot_state = if has(PilotState::TOPIC) { Some(node.input(PilotState::TOPIC, 4)?) } else { None };
         let command = if has(Command::TOPIC) {
             Rc::into_inner(node.output::<Command>(Command::TOPIC, manifest)?)
         } else {
             None
         };
-        let services = manifest.services.keys().cloned().collect();
         Ok(Self {
-            kept,
+            kept: Vec::new(),
             pilot_state,
             newest_pilot_state: None,
             command,
             command_sequence: 0,
-            held,
-            services,
+            held: Vec::new(),
+            services: manifest.services.keys().cloned().collect(),
             node,
         })
     }
