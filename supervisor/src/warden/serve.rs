@@ -61,6 +61,8 @@ struct Warden<S> {
     shared: S,
     manifest: Manifest,
     watch: Watch,
+    /// Why the services were ended.
+    outcome: &'static str,
     log: Log,
     options: Options,
     began: Instant,
@@ -94,6 +96,7 @@ impl<S: SharedMemory> Warden<S> {
         Ok(Self {
             shared,
             watch: Watch::new(limits, services),
+            outcome: "",
             log: Log::new(place.log("warden")),
             options: options.clone(),
             began: Instant::now(),
@@ -136,10 +139,10 @@ impl<S: SharedMemory> Warden<S> {
             wait(&[&self.signals.read], GLANCE);
         }
         self.say("stopped");
-        let Self { shared, manifest, place, .. } = self;
+        let Self { shared, manifest, place, outcome, .. } = self;
         drop(shared);
         place.leave(&manifest);
-        let last = "sereno-warden: the supervisor had died; what flew was landed and everything was stopped\n";
+        let last = format!("sereno-warden: the supervisor had died; {outcome}; everything has been stopped\n");
         // Perhaps nobody listens any more.
         let _ = std::io::stderr().write_all(last.as_bytes());
     }
@@ -167,7 +170,8 @@ impl<S: SharedMemory> Warden<S> {
                 Task::Order(order) => self.shared.land(order),
                 Task::End(why) => {
                     self.now_doing("stopping everything");
-                    self.say(why);
+                    self.say(&format!("{why}; stopping"));
+                    self.outcome = why;
                 }
                 Task::Terminate(service) => signal(&service, Signal::TERM),
                 Task::Kill(service) => {

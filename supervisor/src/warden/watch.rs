@@ -27,7 +27,7 @@ pub(crate) enum Task {
     Land,
     /// Tell the pilot to land.
     Order(u32),
-    /// Nothing flies any more, or nobody waits any longer: say why the services are ended now.
+    /// Nothing flies any more, or nobody waits any longer: say so. The ends follow.
     End(&'static str),
     /// Tell the processes of a service to end (SIGTERM).
     Terminate(String),
@@ -101,17 +101,17 @@ impl Watch {
     ) -> Option<Task> {
         match &mut self.state {
             State::Waiting | State::Over => None,
-            State::Looking(_) | State::Landing(_) if self.hurry => self.end("told to hurry: stopping at once"),
+            State::Looking(_) | State::Landing(_) if self.hurry => self.end("told not to wait"),
             State::Looking(_) if airborne => {
                 self.state = State::Landing(Landing::new(self.limits.land, order, now));
                 Some(Task::Land)
             }
-            State::Looking(until) if now >= *until => self.end("nothing flies: stopping"),
+            State::Looking(until) if now >= *until => self.end("nothing flies"),
             State::Looking(_) => None,
             State::Landing(landing) => match landing.due(airborne, now)? {
                 Descent::Order(order) => Some(Task::Order(order)),
-                Descent::Landed => self.end("landed; stopping"),
-                Descent::Late => self.end("not landed in time; stopping all the same"),
+                Descent::Landed => self.end("landed"),
+                Descent::Late => self.end("not landed in time"),
             },
             State::Ending => self.next_end(living, now),
         }

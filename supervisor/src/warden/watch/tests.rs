@@ -71,7 +71,7 @@ fn what_flies_is_landed_before_anything_ends() {
     let order = Task::Order(ORDER);
     assert_eq!(it.pass(3 * SECOND), [Task::Land, order.clone(), order.clone(), order]);
     it.airborne = false;
-    assert_eq!(it.pass(SECOND), [Task::End("landed; stopping"), terminate("sonar")]);
+    assert_eq!(it.pass(SECOND), [Task::End("landed"), terminate("sonar")]);
     it.gone("sonar");
     assert_eq!(it.pass(SECOND), [terminate("pilot")]);
     it.gone("pilot");
@@ -92,7 +92,7 @@ fn a_pilot_on_the_ground_is_listened_to_before_it_is_believed() {
     let mut it = Clocked::new();
     it.watch.orphaned(it.now);
     assert_eq!(it.pass(LOOK), []);
-    assert_eq!(it.pass(SECOND / 10), [Task::End("nothing flies: stopping"), terminate("sonar")]);
+    assert_eq!(it.pass(SECOND / 10), [Task::End("nothing flies"), terminate("sonar")]);
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn a_landing_that_takes_too_long_is_not_waited_for() {
     it.airborne = true;
     it.watch.orphaned(it.now);
     assert_eq!(it.pass(10 * SECOND).len(), 11);
-    let late = Task::End("not landed in time; stopping all the same");
+    let late = Task::End("not landed in time");
     assert_eq!(it.pass(SECOND), [late, terminate("sonar")]);
 }
 
@@ -110,7 +110,7 @@ fn who_does_not_end_is_killed_until_it_is_gone() {
     let mut it = Clocked::new();
     it.watch.orphaned(it.now);
     it.pass(LOOK);
-    let end = Task::End("nothing flies: stopping");
+    let end = Task::End("nothing flies");
     assert_eq!(it.pass(5 * SECOND), [end, terminate("sonar"), kill("sonar"), kill("sonar")]);
     it.gone("sonar");
     assert_eq!(it.pass(SECOND), [terminate("pilot")]);
@@ -123,7 +123,7 @@ fn in_a_hurry_all_end_together() {
     it.watch.orphaned(it.now);
     it.pass(SECOND);
     it.watch.hurry();
-    let end = Task::End("told to hurry: stopping at once");
+    let end = Task::End("told not to wait");
     let all = ["sonar", "pilot", "flight"];
     assert_eq!(it.pass(HURRY), [vec![end], all.map(terminate).into()].concat());
     assert_eq!(it.pass(HURRY), all.map(kill));
