@@ -1,6 +1,6 @@
 //! The other end of the control socket, for the command line.
 
-use crate::place::control_socket;
+use crate::place::{control_socket, warden_at_work};
 use crate::protocol::{Request, Response, ServiceRow};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -22,6 +22,14 @@ pub enum ClientError {
         run_dir: PathBuf,
         /// What the operating system said.
         source: std::io::Error,
+    },
+    /// The supervisor has died, and its warden brings the system to its end.
+    #[error("{}: nobody takes orders here any more: it is in the hands of {warden}", .run_dir.display())]
+    Orphaned {
+        /// The run directory.
+        run_dir: PathBuf,
+        /// Process id and what it does.
+        warden: String,
     },
     /// The connection broke or the answer took too long.
     #[error("the supervisor does not answer: {0}")]
@@ -67,9 +75,12 @@ impl Client {
     /// Connects to the system that runs in a run directory.
     ///
     /// # Errors
-    /// [`ClientError::NotRunning`].
+    /// [`ClientError::NotRunning`], [`ClientError::Orphaned`].
     pub fn connect(run_dir: &Path) -> Result<Self, ClientError> {
-        let failed = |source| ClientError::NotRunning { run_dir: run_dir.to_owned(), source };
+        let failed = |source| match warden_at_work(run_dir) {
+            Some(warden) => ClientError::Orphaned { run_dir: run_dir.to_owned(), warden },
+            None => ClientError::NotRunning { run_dir: run_dir.to_owned(), source },
+        };
         let stream = UnixStream::connect(control_socket(run_dir)).map_err(failed)?;
         stream.set_read_timeout(Some(PATIENCE)).map_err(ClientError::Broken)?;
         stream.set_write_timeout(Some(PATIENCE)).map_err(ClientError::Broken)?;

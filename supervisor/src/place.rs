@@ -17,6 +17,11 @@ const SOCKET_PATH: usize = 107;
 /// A killed process is gone within milliseconds unless it hangs in the kernel.
 const ORPHAN_PATIENCE: Duration = Duration::from_secs(3);
 
+/// What a warden at work is called among processes.
+pub(crate) const WARDEN_NAME: &str = "sereno-warden";
+/// How what it writes in the lock begins.
+const WARDEN_HOLDS: &str = "process ";
+
 /// Socket for requests inside a run directory.
 pub(crate) fn control_socket(run_dir: &Path) -> PathBuf {
     run_dir.join("control.sock")
@@ -82,10 +87,14 @@ impl Place {
         self.lock.as_fd()
     }
 
-    /// Changes what whoever wants the directory is told of its holder.
-    pub(crate) fn held_by(&self, holder: &str) {
+    /// Lets whoever wants the directory know what its supervisor's warden, this process, does.
+    pub(crate) fn held_by_warden(&self, doing: &str) {
+        let own = std::process::id();
         // The lock counts, not what is written in it.
-        let _ = write_holder(&self.lock, holder);
+        let _ = write_holder(
+            &self.lock,
+            &format!("{WARDEN_HOLDS}{own}, the warden, which is {doing} after its supervisor died"),
+        );
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -126,6 +135,15 @@ impl Place {
         // Stays when somebody else's files are in it.
         let _ = std::fs::remove_dir(self.path());
     }
+}
+
+/// Who brings a system to its end whose supervisor has died, as it writes it in the lock; nobody when none does.
+pub(crate) fn warden_at_work(run_dir: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(run_dir.join("lock")).ok()?;
+    let pid: u32 = text.strip_prefix(WARDEN_HOLDS)?.split(',').next()?.parse().ok()?;
+    // The file stays if it dies.
+    let name = std::fs::read_to_string(format!("/proc/{pid}/comm")).ok()?;
+    (name.trim_end() == WARDEN_NAME).then(|| text.trim_end().to_owned())
 }
 
 /// What is not there need not be removed; what cannot be removed is met again at the next start.
@@ -209,7 +227,8 @@ pub(crate) fn orphans(run_dir: &Path) -> Vec<(Pid, String)> {
         if !variables().any(|variable| variable == mark) {
             return None;
         }
-        let name = variables().find_map(|variable| variable.strip_prefix(name.as_slice())).unwrap_or_default();
+        let name =
+            variables().find_map(|variable| variable.strip_prefix(name.as_slice())).unwrap_or_default();
         Some(String::from_utf8_lossy(name).into_owned())
     };
     let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();

@@ -17,7 +17,7 @@ pub(crate) use serve::serve;
 
 use crate::SupervisorError;
 use crate::child::end_words;
-use crate::place::Place;
+use crate::place::{Place, WARDEN_NAME};
 use manifest::RestartPolicy;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::BorrowedFd;
@@ -65,7 +65,7 @@ impl Warden {
         let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
         // The very executable that runs here, whatever has been built in its place since.
         let process = Command::new("/proc/self/exe")
-            .arg0("sereno-warden")
+            .arg0(WARDEN_NAME)
             .args(arguments)
             .env(WANTED, "1")
             .env(env::MANIFEST, manifests)

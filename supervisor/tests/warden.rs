@@ -7,6 +7,7 @@ use rustix::process::{Pid, Signal, kill_process_group};
 use std::os::unix::process::CommandExt;
 use std::process::Stdio;
 use std::time::Duration;
+use supervisor::Client;
 use system::{System, alive, exists, kill, processes, wait_until};
 
 fn log(system: &System, name: &str) -> String {
@@ -78,6 +79,8 @@ fn a_killed_supervisor_lands_first_and_nobody_may_take_its_place_meanwhile() {
     assert!(said.contains("already in use by process "), "{said}");
     assert!(said.contains(", the warden, which is landing after its supervisor died"), "{said}");
     assert!(pids.into_iter().all(alive), "it is not disturbed");
+    let said = Client::connect(&system.run_dir()).unwrap_err().to_string();
+    assert!(said.contains("in the hands of process ") && said.contains("which is landing"), "{said}");
 
     std::fs::remove_file(system.path("airborne")).unwrap();
     all_is_over(&system);
@@ -149,7 +152,10 @@ fn a_killed_warden_is_replaced_and_nobody_else_notices() {
         known = warden(&system);
     }
     let own = system.client().logs("supervisor", 100).unwrap();
-    assert!(own.iter().any(|line| line.ends_with("warden: killed (signal 9); another one follows")), "{own:?}");
+    assert!(
+        own.iter().any(|line| line.ends_with("warden: killed (signal 9); another one follows")),
+        "{own:?}"
+    );
     assert_eq!((system.row("a").pid, system.row("a").restarts), (Some(service), 0));
 
     // And it does what the first would have done, as soon as it is ready: it catches signals then.

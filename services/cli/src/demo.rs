@@ -54,7 +54,7 @@ impl System {
 
 impl Drop for System {
     fn drop(&mut self) {
-        // After a regular stop there is nothing left to kill.
+        // After a regular stop there is nothing left to kill; otherwise its warden brings the rest to an end.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }

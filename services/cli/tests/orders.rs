@@ -1,8 +1,8 @@
 //! Orders to the supervised simulated system: every service its own process on real shared memory, and the
 //! `sereno` command as people type it.
 //!
-//! The test executable plays all the parts: it is started again with [`PART`] set, as the supervisor or as one of
-//! the services, which are the real ones.
+//! The test executable plays all the parts: it is started again with [`PART`] set, as the supervisor, its warden or one
+//! of the services, which are the real ones.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use cli::orders::{Orders, next_order_number};
@@ -143,10 +143,11 @@ impl System {
 
 impl Drop for System {
     fn drop(&mut self) {
-        // Its services die with it.
-        let _ = self.supervisor.kill();
+        if !self.run(&["down", "--now"]).status.success() {
+            // Its warden ends what it leaves.
+            let _ = self.supervisor.kill();
+        }
         let _ = self.supervisor.wait();
-        runtime::shm::RunDir::new(self.run_dir()).wipe();
     }
 }
 
@@ -238,7 +239,7 @@ fn two_operators_and_a_restart(system: &System) {
     }
 }
 
-/// Seven programs die while they wait for an answer; a topic has places for four publishers.
+/// Seven programs die while they wait for an answer; a topic has places for five publishers.
 fn dead_tools_are_forgotten(system: &System) {
     assert!(system.run(&["hold", "navigation"]).status.success());
     let mut tool = system.tool();

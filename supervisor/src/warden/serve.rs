@@ -5,7 +5,7 @@ use super::{GOODBYE, READY};
 use crate::error::while_doing;
 use crate::landing::order_number;
 use crate::log::Log;
-use crate::place::{Place, orphans};
+use crate::place::{Place, WARDEN_NAME, orphans};
 use crate::shared::SharedMemory;
 use crate::show::show;
 use crate::signals::SignalPipe;
@@ -77,7 +77,7 @@ impl<S: SharedMemory> Warden<S> {
         open: impl FnOnce(&Manifest, &RunDir) -> Result<S, SupervisorError>,
     ) -> Result<Self, SupervisorError> {
         // Wishes: a name by which people find it, and to be the last whom a machine without memory kills.
-        let _ = std::fs::write("/proc/self/comm", "sereno-warden");
+        let _ = std::fs::write("/proc/self/comm", WARDEN_NAME);
         let _ = std::fs::write("/proc/self/oom_score_adj", "-1000");
         let signals = SignalPipe::new(&[SIGTERM, SIGINT, SIGHUP])?;
         let variable = |name: &str| {
@@ -126,7 +126,7 @@ impl<S: SharedMemory> Warden<S> {
     /// Brings the system to its end in place of the supervisor.
     fn take_over(mut self) {
         self.watch.orphaned(Instant::now());
-        self.now_doing("looking whether anything flies");
+        self.place.held_by_warden("looking whether anything flies");
         self.say("the supervisor has died without a good-bye");
         loop {
             self.shared.keep();
@@ -142,7 +142,8 @@ impl<S: SharedMemory> Warden<S> {
         let Self { shared, manifest, place, outcome, .. } = self;
         drop(shared);
         place.leave(&manifest);
-        let last = format!("sereno-warden: the supervisor had died; {outcome}; everything has been stopped\n");
+        let last =
+            format!("{WARDEN_NAME}: the supervisor had died; {outcome}; everything has been stopped\n");
         // Perhaps nobody listens any more.
         let _ = std::io::stderr().write_all(last.as_bytes());
     }
@@ -164,12 +165,12 @@ impl<S: SharedMemory> Warden<S> {
             };
             match task {
                 Task::Land => {
-                    self.now_doing("landing");
+                    self.place.held_by_warden("landing");
                     self.say("it flies: landing; a signal to this process stops at once");
                 }
                 Task::Order(order) => self.shared.land(order),
                 Task::End(why) => {
-                    self.now_doing("stopping everything");
+                    self.place.held_by_warden("stopping everything");
                     self.say(&format!("{why}; stopping"));
                     self.outcome = why;
                 }
@@ -181,12 +182,6 @@ impl<S: SharedMemory> Warden<S> {
                 Task::Leave => return true,
             }
         }
-    }
-
-    /// For whoever wants to start a supervisor here.
-    fn now_doing(&self, what: &str) {
-        let own = std::process::id();
-        self.place.held_by(&format!("process {own}, the warden, which is {what} after its supervisor died"));
     }
 
     fn say(&mut self, text: &str) {
