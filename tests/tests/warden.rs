@@ -19,9 +19,9 @@ const FLYING_M: f32 = 0.8;
 const FLYING_M_S: f32 = 0.15;
 /// A floor touched faster counts as a contact (DESIGN 5).
 const HARD_M_S: f32 = 0.7;
-/// What `flight` alone may touch at: it takes the last 11 cm for none and falls. Seen were 0.95 to 1.2 m/s; from the height
-/// of a round it would be 4.8.
-const ALONE_M_S: f32 = 1.5;
+/// What `flight` alone may touch at, taken in the middle of a motion: it is level and drifts, and may come down on an edge.
+/// A fall from the height of a round would end at 4.8. `alone.rs` is stricter with one that stood.
+const ALONE_M_S: f32 = 1.0;
 /// From the highest flight (1.2 m) at the usual 0.3 m/s, with the stop before it and a margin for a loaded machine.
 const LANDED: Duration = Duration::from_secs(25);
 /// Seven services, each of which ends within milliseconds or is killed after two seconds.

@@ -5,22 +5,26 @@
 //! of a table and moves the ground, not the aircraft. Without echoes the filter goes on by dead reckoning.
 
 use crate::config::Config;
+use crate::wish::LOW_US;
 
+/// No thrust.
+const LOW: f32 = LOW_US as f32;
 /// Standard gravity.
 const GRAVITY: f32 = 9.81;
 /// Thrust grows between linearly and with the square of the throttle above 1000 us: in between.
 const THRUST_EXPONENT: f32 = 1.5;
-/// Filter gains a reading: position settles in two, the rest follows from it (Kalata's critically damped
-/// relations, rounded).
+/// Filter gains a reading: position settles in two, the climb follows from it (Kalata's critically damped relations, rounded).
+/// The acceleration is learned three times slower than these ask for: ground effect and sag come slowly, and with the loop
+/// around it the aircraft swings between 0.1 and 0.8 m/s otherwise.
 const ALPHA: f32 = 0.5;
 const BETA: f32 = 0.17;
-const GAMMA: f32 = 0.03;
+const GAMMA: f32 = 0.01;
 /// A range that is off by more is another surface or an outlier: no descent moves so far between two pings.
 const JUMP_M: f32 = 0.25;
 /// Two jumped readings so close together are a surface.
 const AGREE_M: f32 = 0.15;
-/// Acceleration for an error of climb, 1/s: slower than the filter, faster than the ground comes.
-const CLIMB_GAIN: f32 = 2.5;
+/// Acceleration for an error of climb, 1/s: slower than the filter at a ping every 0.2 s, faster than the ground comes.
+const CLIMB_GAIN: f32 = 1.2;
 /// Most acceleration that the loop asks for.
 const MOST_M_S2: f32 = 1.5;
 /// Most error of the hover throttle that is learned: 20 % of weight.
@@ -35,6 +39,17 @@ const BLIND_BIAS_M_S2: f32 = 0.1;
 const BLIND_BIAS_GROWTH_M_S3: f32 = 0.08;
 /// Most of it: a tenth of the weight.
 const MOST_BIAS_M_S2: f32 = 1.0;
+/// It stands when it has come no nearer to the ground for so long, seconds, and is lower than this, metres. A range says no more:
+/// the floor here may be a few centimetres off what it was at the take-off.
+const STILL_LOW_S: f32 = 0.4;
+const LOW_M: f32 = 0.12;
+/// On a chair it is believed later, and only below this height, metres.
+const STILL_S: f32 = 0.8;
+const CHAIR_M: f32 = 0.3;
+/// Without any motion for so long it stands wherever that is, seconds.
+const STUCK_S: f32 = 4.0;
+/// From standing to no thrust, seconds: from 6 cm too high an aircraft that is cut off falls at 1.1 m/s, with this at 0.6.
+const RELEASE_S: f32 = 0.8;
 /// Height assumed when nobody knows it: patrol height.
 const UNKNOWN_HEIGHT_M: f32 = 1.2;
 /// Reckoned so far below the ground, it has long been reached: six seconds more than was reckoned.
@@ -71,7 +86,8 @@ struct Falling {
     /// Height at which the range began to stand still, and when.
     still_m: f32,
     still_ns: u64,
-    low_ns: Option<u64>,
+    /// When it was found to stand, and the throttle then.
+    stands: Option<(u64, f32)>,
     /// When it became blind.
     blind_ns: Option<u64>,
 }
@@ -165,7 +181,7 @@ impl Descent {
             jumped_m: None,
             still_m: height_m,
             still_ns: now,
-            low_ns: None,
+            stands: None,
             blind_ns: None,
         });
     }
@@ -214,8 +230,15 @@ impl Descent {
         falling.throttle_us =
             (falling.hover_us + (acceleration - falling.offset_m_s2 - bias) / slope).clamp(1050.0, 1900.0);
         let last_heard_m = self.sonar.range_m - self.sonar.standing_m;
-        let touched = falling.touched(now, heard, last_heard_m);
-        Some(DescentStep { throttle_us: falling.throttle_us, touched })
+        if falling.stands.is_none() && falling.is_standing(now, heard, last_heard_m) {
+            falling.stands = Some((now, falling.throttle_us));
+        }
+        let Some((since, throttle_us)) = falling.stands else {
+            return Some(DescentStep { throttle_us: falling.throttle_us, touched: false });
+        };
+        // Once found to stand it is not asked again: the range of a standing aircraft is worth little.
+        let left = 1.0 - seconds(since, now) / RELEASE_S;
+        Some(DescentStep { throttle_us: LOW + (throttle_us - LOW) * left.max(0.0), touched: left <= 0.0 })
     }
 }
 
@@ -266,7 +289,7 @@ impl Falling {
             .clamp(-MOST_OFFSET_M_S2, MOST_OFFSET_M_S2);
     }
 
-    fn touched(&mut self, now: u64, heard: bool, last_heard_m: f32) -> bool {
+    fn is_standing(&mut self, now: u64, heard: bool, last_heard_m: f32) -> bool {
         if (self.height_m - self.still_m).abs() > 0.03 {
             self.still_m = self.height_m;
             self.still_ns = now;
@@ -276,14 +299,8 @@ impl Falling {
             return self.height_m < if last_heard_m < 0.15 { -0.15 } else { -BELOW_GROUND_M };
         }
         let still_s = seconds(self.still_ns, now);
-        let low = self.height_m < 0.04;
-        let low_since = if low { *self.low_ns.get_or_insert(now) } else { now };
-        if !low {
-            self.low_ns = None;
-        }
-        low && seconds(low_since, now) > 0.2
-            // It does not come down any further: it stands, perhaps on a chair.
-            || self.height_m < 0.3 && still_s > 0.8
-            || still_s > 4.0
+        self.height_m < LOW_M && still_s > STILL_LOW_S
+            || self.height_m < CHAIR_M && still_s > STILL_S
+            || still_s > STUCK_S
     }
 }

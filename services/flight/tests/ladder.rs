@@ -50,7 +50,8 @@ fn level_at_100_ms_descend_at_300_down_softly_and_off() {
         let impact = world.impact.unwrap();
         let took = (world.now - silent) / MS;
         assert!(impact < 0.5, "touched at {impact} m/s, hover {true_hover}");
-        assert!(took < 9_000, "{took} ms from {height} m");
+        // 0.3 s to see that it stands, 0.8 s until the motors are off.
+        assert!(took < 10_000, "{took} ms from {height} m");
         assert!(gap(&world, silent) <= 30);
         world.run(500);
         assert_eq!(world.state().ladder, Ladder::TouchDown.code());
