@@ -1,5 +1,6 @@
 //! Everything but the ports: from places, echoes, commands and the pilot's state to a setpoint.
 
+use crate::aside::Courtesy;
 use crate::atlas::Atlas;
 use crate::blockage::{Blockage, Verdict};
 use crate::config::NavigationConfig;
@@ -44,6 +45,7 @@ pub struct Core {
     waited_before_s: f32,
     pub(crate) mission: Mission,
     pub(crate) journey: Journey,
+    pub(crate) courtesy: Courtesy,
     stand: Option<(f32, f32)>,
     last_ns: Option<u64>,
     pub(crate) text: Text<128>,
@@ -75,6 +77,7 @@ impl Core {
             walls: WallLayer::new(),
             blockage: Blockage::default(),
             waited_before_s: 0.0,
+            courtesy: Courtesy::default(),
             stand: None,
             last_ns: None,
             text: Text::new("waiting for a command"),
@@ -186,6 +189,7 @@ impl Core {
         }
         self.steering.forget();
         self.blockage.reset();
+        self.courtesy.forget();
         self.stand = None;
     }
 
@@ -263,6 +267,12 @@ impl Core {
         let Some(place) = self.fresh_place(now) else {
             return;
         };
+        if self.courtesy.over(now, &self.senses)
+            && !self.journey.planned()
+            && self.mission.goal() != Goal::None
+        {
+            self.journey.plan();
+        }
         let before = self.mission.heard();
         match self.journey.work(self.mission.goal(), &place, self.mission.pad()) {
             Work::Ready => {
@@ -325,8 +335,23 @@ impl Core {
         let blocked = steer.reason == SteeringReason::Blocked;
         let along = self.journey.track().along();
         let config = &self.config;
+        let now = self.last_ns.unwrap_or_default();
+        self.courtesy.look(now, &self.senses, place, steer.target);
         match self.blockage.watch(dt_s, blocked, along, config.wait_s, config.stuck_s) {
+            Verdict::Wait
+                if !self.journey.stepping_aside
+                    && self.courtesy.due(now, place, self.blockage.waited_s(), self.journey.contested()) =>
+            {
+                self.journey.plan_aside(steer.target);
+                self.plan_anew(place);
+                return setpoint;
+            }
             Verdict::Go | Verdict::Wait => {}
+            Verdict::Blocked | Verdict::Stuck if self.journey.stepping_aside => {
+                self.journey.plan();
+                self.plan_anew(place);
+                return setpoint;
+            }
             Verdict::Blocked | Verdict::Stuck => {
                 self.journey.obstruct(place, steer.target, &grid.cells, &window);
                 self.journey.plan();
@@ -346,6 +371,12 @@ impl Core {
             && self.journey.complete()
             && self.journey.track().remaining() < ARRIVED_M
         {
+            if self.journey.stepping_aside {
+                self.courtesy.stay(now);
+                self.journey.drop_route();
+                self.plan_anew(place);
+                return setpoint;
+            }
             let pad = self.mission.pad().unwrap_or(end);
             let home = (pad.0 - end.0).hypot(pad.1 - end.1) < HOME_M;
             if home || matches!(self.mission.goal(), Goal::There(_)) {

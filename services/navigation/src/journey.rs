@@ -110,6 +110,10 @@ pub struct Journey {
     afresh: bool,
     /// It begins with an amnesty, for the doors too if so.
     pardon: Option<Pardon>,
+    /// It leads aside from a way that leads so, radians.
+    aside: Option<f32>,
+    /// The route leads aside, to let somebody pass.
+    pub(crate) stepping_aside: bool,
 }
 
 impl Journey {
@@ -149,6 +153,8 @@ impl Journey {
             trouble: Text::default(),
             afresh: false,
             pardon: None,
+            aside: None,
+            stepping_aside: false,
             map,
             atlas,
         }
@@ -194,8 +200,16 @@ impl Journey {
         self.fresh_starts = 0;
     }
 
+    /// Asks for a way aside from one that leads `towards`, radians; for the route, where there is no room.
+    pub(crate) fn plan_aside(&mut self, towards: f32) {
+        self.plan();
+        self.aside = towards.is_finite().then_some(towards);
+    }
+
     /// No route, and none wanted.
     pub fn drop_route(&mut self) {
+        self.stepping_aside = false;
+        self.aside = None;
         self.stage = Stage::Idle;
         self.stops.clear();
         self.corners.clear();
@@ -263,6 +277,9 @@ impl Journey {
     /// # Errors
     /// Only what `out` itself reports.
     pub fn write_errand(&self, out: &mut dyn Write) -> fmt::Result {
+        if self.stepping_aside {
+            return write!(out, "stepping aside for somebody");
+        }
         let looks = self.stops.iter().filter(|stop| stop.look).count();
         match self.stops.get(self.target) {
             Some(stop) if stop.look => {

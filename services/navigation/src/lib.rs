@@ -10,6 +10,7 @@
 //! - [`blockage`]: when a way counts as blocked
 //! - [`mission`]: commands, phases of the pilot, the pad
 //! - [`journey`]: planning in slices, what was seen, what is left out and why; survives a restart
+//! - `aside`: stepping aside for people in narrow places
 //! - `setbacks`: where the way was blocked before
 //! - [`atlas`]: what is known of the building
 //! - [`core`]: all of it together, without ports
@@ -17,6 +18,7 @@
 //! Nothing here allocates after start but the planning slices of [`journey`].
 #![forbid(unsafe_code)]
 
+mod aside;
 pub mod atlas;
 pub mod blockage;
 pub mod config;

@@ -44,6 +44,8 @@ pub struct Approach {
     pub distance: f32,
     /// Its own, metres a second.
     pub speed: f32,
+    /// How far it has come in a row, metres.
+    pub walked: f32,
 }
 
 /// The newest word of one sonar.
@@ -55,8 +57,9 @@ struct Side {
     distance: f32,
     /// Where the sensor was, plan frame, metres.
     from: (f32, f32),
-    /// How fast it comes nearer by itself, metres a second.
+    /// How fast it comes nearer by itself, metres a second, and how far it has come in a row, metres.
     own_m_s: f32,
+    walked_m: f32,
 }
 
 /// What the side sonars said last.
@@ -104,6 +107,7 @@ impl Senses {
             distance,
             from: (0.0, 0.0),
             own_m_s: 0.0,
+            walked_m: 0.0,
         };
         self.newest_ns = self.newest_ns.max(reading.ping_ns);
 
@@ -126,6 +130,9 @@ impl Senses {
             let own_m_s = (last.distance - side.distance - flown) / since;
             // Faster, or from nowhere, is another surface.
             side.own_m_s = if own_m_s < FASTEST_M_S { own_m_s } else { 0.0 };
+            if side.own_m_s > WALKS_M_S {
+                side.walked_m = last.walked_m + side.own_m_s * since;
+            }
         }
         Some(Beam { x_m, y_m, angle_rad, echo })
     }
@@ -143,6 +150,7 @@ impl Senses {
             bearing: side.bearing,
             distance: side.distance,
             speed: side.own_m_s,
+            walked: side.walked_m,
         })
     }
 

@@ -30,6 +30,7 @@ impl Core {
                 };
                 self.write_steering(&mut text)
             }
+            _ if self.courtesy.staying() => write!(text, "letting somebody pass"),
             _ if !journey.planned() => write!(text, "working out the route"),
             _ if !self.mission.airborne() => write!(text, "ready: waiting for the take-off"),
             _ => write!(text, "standing: the pilot is flying on its own"),

@@ -182,6 +182,11 @@ impl Costmap {
         self.field.distance(x, y).min(self.unmapped_clearance[cell])
     }
 
+    /// Clearance at a place to what the plan shows, metres, at most 2.
+    pub fn mapped_clearance(&self, x: f32, y: f32) -> f32 {
+        self.field.distance(x, y)
+    }
+
     /// Whether the vehicle may be at a place.
     pub fn passable(&self, x: f32, y: f32) -> bool {
         self.raster.cell(x, y).is_some_and(|cell| self.is_passable(cell))

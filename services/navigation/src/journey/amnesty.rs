@@ -35,6 +35,11 @@ impl Amnesties {
         self.given < AMNESTIES
     }
 
+    /// Whether the last one was given where the one before was: somebody there does not move on.
+    fn waits(&self) -> bool {
+        self.more > 0
+    }
+
     /// One is given here.
     fn give(&mut self, here: Option<(f32, f32)>) {
         let near = |(a, b): (&(f32, f32), &(f32, f32))| (a.0 - b.0).hypot(a.1 - b.1) < HERE_M;
@@ -62,6 +67,11 @@ impl Journey {
         self.given_up.clear();
         self.pardon = Some(Pardon { doors });
         true
+    }
+
+    /// Whether the drone has come back to a blocked place and found it blocked again, with nothing else left to see.
+    pub(crate) fn waits_in_vain(&self) -> bool {
+        self.amnesties.waits()
     }
 
     /// Forgets what an amnesty was given for. Works through the whole map: part of planning, never of a decision.

@@ -62,6 +62,16 @@ impl Journey {
     }
 
     fn begin(&mut self, goal: Goal, place: &Place, pad: Option<(f32, f32)>) -> Work {
+        if let Some(towards) = self.aside.take()
+            && goal != Goal::None
+            && let Some((x, y)) = self.room_beside(place, towards)
+        {
+            self.round = false;
+            self.stepping_aside = true;
+            self.stops.clear();
+            self.stops.push(Stop { x, y, room: None, look: false });
+            return self.begin_leg(0, (place.x, place.y));
+        }
         self.round = goal == Goal::Round;
         let to = match (goal, pad) {
             (Goal::None, _) => return Work::Idle,

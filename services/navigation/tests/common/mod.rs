@@ -7,6 +7,8 @@
     reason = "shared by several test binaries"
 )]
 
+pub mod flight;
+
 use avoid::grid::{insert, scroll};
 use avoid::{CELLS, GridRules, Histogram, SECTORS, WallLayer, Window, wrap};
 use floorplan::{Cell, DistanceField, Plan};
@@ -28,7 +30,12 @@ pub struct World {
     pub plan: Plan,
     pub field: DistanceField,
     solid: DistanceField,
+    /// People, where they stand now.
+    pub people: Vec<(f32, f32)>,
 }
+
+/// Shoulders and a coat.
+pub const PERSON_M: f32 = 0.25;
 
 /// Reads a map: `#` wall, `o` stands there but is not on the plan; everything else is free.
 pub fn world(rows: &[&str], resolution: f64) -> World {
@@ -43,7 +50,7 @@ pub fn world(rows: &[&str], resolution: f64) -> World {
     let (truth, plan) = (with("#o"), with("#"));
     let field = DistanceField::of_not_free(&plan, 2.0);
     let solid = DistanceField::new(&truth, 2.0);
-    World { truth, plan, field, solid }
+    World { truth, plan, field, solid, people: Vec::new() }
 }
 
 /// The middle of the character `mark`, metres.
@@ -59,7 +66,8 @@ pub fn find(rows: &[&str], mark: char, resolution: f32) -> (f32, f32) {
 impl World {
     /// Metres between the airframe and the nearest thing.
     pub fn gap(&self, x: f32, y: f32) -> f32 {
-        self.solid.distance(x, y) - RADIUS_M
+        let people = self.people.iter().map(|person| (person.0 - x).hypot(person.1 - y) - PERSON_M);
+        people.fold(self.solid.distance(x, y), f32::min) - RADIUS_M
     }
 
     /// What the sonar at this body bearing hears.
@@ -73,6 +81,12 @@ impl World {
             .filter(|hit| hit.incidence_rad < 30.0_f32.to_radians())
             .map(|hit| hit.range_m)
             .fold(f32::INFINITY, f32::min);
+        let heard = |person: &(f32, f32)| {
+            let (dx, dy) = (person.0 - fx, person.1 - fy);
+            let aside = wrap(dy.atan2(dx) - angle).abs() - (PERSON_M / dx.hypot(dy)).min(1.0).asin();
+            (aside < 15.0_f32.to_radians()).then(|| (dx.hypot(dy) - PERSON_M).max(0.02))
+        };
+        let nearest = self.people.iter().filter_map(heard).fold(nearest, f32::min);
         let status = if nearest.is_finite() { SonarStatus::Ok } else { SonarStatus::NoEcho };
         SonarReading {
             ping_ns: now,
