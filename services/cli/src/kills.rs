@@ -78,6 +78,7 @@ impl Kills {
             && let Some(action) = FailsafeAction::from_code(state.action)
             && let Some(cause) = FailsafeCause::from_code(state.cause)
             && action != FailsafeAction::None
+            && may_follow_from_a_kill(cause)
             && self.worst.is_none_or(|(worst, _)| action.code() > worst.code())
         {
             self.worst = Some((action, cause));
@@ -127,9 +128,23 @@ impl Kills {
     }
 }
 
+/// No kill empties a battery: a long round ends on it with kills and without.
+fn may_follow_from_a_kill(cause: FailsafeCause) -> bool {
+    !matches!(cause, FailsafeCause::BatteryReturn | FailsafeCause::BatteryLand)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_battery_that_runs_low_is_not_the_kills_doing() {
+        assert!(!may_follow_from_a_kill(FailsafeCause::BatteryReturn));
+        assert!(!may_follow_from_a_kill(FailsafeCause::BatteryLand));
+        for cause in [FailsafeCause::NavigationSilent, FailsafeCause::PoseUncertain, FailsafeCause::Lost] {
+            assert!(may_follow_from_a_kill(cause), "{cause}");
+        }
+    }
 
     #[test]
     fn every_service_has_its_turns_in_an_order_of_the_seed() {
