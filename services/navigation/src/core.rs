@@ -1,8 +1,10 @@
 //! Everything but the ports: from places, echoes, commands and the pilot's state to a setpoint.
 
+mod follow;
+
 use crate::aside::Courtesy;
 use crate::atlas::Atlas;
-use crate::blockage::{Blockage, Verdict};
+use crate::blockage::Blockage;
 use crate::config::NavigationConfig;
 use crate::journey::{Journey, Work};
 use crate::mission::{Event, Goal, Heard, Intent, Mission, Nonsense};
@@ -14,17 +16,13 @@ use avoid::grid::{insert, scroll};
 use avoid::{CELL_M, CELLS, GridRules, Histogram, SIDE, WallLayer, Window};
 use floorplan::Cell;
 use ipc_types::{
-    Answer, Command, Grid, Patrol, PilotState, Polar, Pose, Setpoint, SetpointKind, SonarRanges,
-    SteeringReason, Text, seconds_between,
+    Answer, Command, Grid, Patrol, PilotState, Polar, Pose, Setpoint, SetpointKind, SonarRanges, Text,
+    seconds_between,
 };
 use std::sync::Arc;
 
 /// Slower wishes are a hover at the place where the drone stands: a velocity of nothing drifts.
 const STANDING_M_S: f32 = 0.03;
-/// The route ends this near to its last point, metres: the hold of the hover does the rest.
-const ARRIVED_M: f32 = 0.3;
-/// A route that ends this near to the pad leads home, metres.
-const HOME_M: f32 = 0.6;
 /// Cells of the plan nearer to a wall than this are stamped as wall, metres.
 const WALL_SKIN_M: f32 = 0.02;
 /// Beams kept for the grid between two decisions: two sweeps of a full set of sonars.
@@ -320,98 +318,6 @@ impl Core {
         let mut histogram =
             Histogram { raw: &mut polar.raw, smoothed: &mut polar.smoothed, blocked: &mut polar.blocked };
         self.steering.step(&self.config, &scene, aim, &mut histogram)
-    }
-
-    /// Turns what steering wishes into a setpoint, and looks after blocked ways and the end of the route.
-    fn follow(
-        &mut self,
-        dt_s: f32,
-        place: &Place,
-        grid: &Grid,
-        window: Window,
-        steer: &Steer,
-        mut setpoint: Setpoint,
-    ) -> Setpoint {
-        let blocked = steer.reason == SteeringReason::Blocked;
-        let along = self.journey.track().along();
-        let config = &self.config;
-        let now = self.last_ns.unwrap_or_default();
-        self.courtesy.look(now, &self.senses, place, steer.target);
-        match self.blockage.watch(dt_s, blocked, along, config.wait_s, config.stuck_s) {
-            Verdict::Wait
-                if !self.journey.stepping_aside
-                    && self.courtesy.due(now, place, self.blockage.waited_s(), self.journey.contested()) =>
-            {
-                self.journey.plan_aside(steer.target);
-                self.plan_anew(place);
-                return setpoint;
-            }
-            Verdict::Go | Verdict::Wait => {}
-            Verdict::Blocked | Verdict::Stuck if self.journey.stepping_aside => {
-                self.journey.plan();
-                self.plan_anew(place);
-                return setpoint;
-            }
-            Verdict::Blocked | Verdict::Stuck => {
-                self.journey.obstruct(place, steer.target, &grid.cells, &window);
-                self.journey.plan();
-                self.plan_anew(place);
-                return setpoint;
-            }
-        }
-        if self.mission.goal() == Goal::Round && self.journey.look_again() {
-            self.plan_anew(place);
-            return setpoint;
-        }
-        if self.journey.homeward() {
-            self.mission.homeward();
-        }
-        let end = self.journey.track().end().filter(|end| place.distance(*end) < ARRIVED_M + 0.1);
-        if let Some(end) = end
-            && self.journey.complete()
-            && self.journey.track().remaining() < ARRIVED_M
-        {
-            if self.journey.stepping_aside {
-                self.courtesy.stay(now);
-                self.journey.drop_route();
-                self.plan_anew(place);
-                return setpoint;
-            }
-            let pad = self.mission.pad().unwrap_or(end);
-            let home = (pad.0 - end.0).hypot(pad.1 - end.1) < HOME_M;
-            if home || matches!(self.mission.goal(), Goal::There(_)) {
-                self.mission.arrived(end);
-                self.journey.drop_route();
-            } else {
-                // There was no way home from afar: asked again from here, for what stood in the way may have moved on.
-                if !(self.mission.goal() == Goal::Round && self.journey.forgive()) {
-                    self.mission.homeward();
-                }
-                self.mission.replanning(place);
-                self.journey.plan();
-            }
-            self.steering.forget();
-            return setpoint;
-        }
-        setpoint.heading_rad = steer.heading;
-        let (vx, vy) = steer.velocity;
-        if vx.hypot(vy) < STANDING_M_S {
-            let (x, y) = *self.stand.get_or_insert((place.x, place.y));
-            (setpoint.hold_x_m, setpoint.hold_y_m) = (x, y);
-        } else {
-            self.stand = None;
-            setpoint.kind = u32::from(SetpointKind::Velocity.code());
-            (setpoint.velocity_x_m_s, setpoint.velocity_y_m_s) = (vx, vy);
-            (setpoint.hold_x_m, setpoint.hold_y_m) = (f32::NAN, f32::NAN);
-        }
-        setpoint
-    }
-
-    /// Another route is asked for: the drone stands until it is there.
-    fn plan_anew(&mut self, place: &Place) {
-        self.mission.replanning(place);
-        self.blockage.reset();
-        self.steering.forget();
     }
 
     /// The setpoint of an intent, before steering has its say.
