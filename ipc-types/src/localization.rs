@@ -66,6 +66,11 @@ message! {
         pub state: u32,
         /// Walls that answered within the last second and fit the plan.
         pub walls_in_echo: u32,
+        /// 1: nobody knows yet where on the plan the drone is, and the plan is being searched. Place, velocity and heading
+        /// are then in a frame of their own, whose place and turn against the plan are not known.
+        pub searching: u32,
+        /// Zero.
+        pub reserved: u32,
     }
 }
 

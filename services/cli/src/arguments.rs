@@ -3,6 +3,7 @@
 use crate::operate::Order;
 use anyhow::{Result, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use cli::flight::Begin;
 use cli::place::Place;
 use std::path::PathBuf;
 
@@ -175,9 +176,12 @@ pub(crate) struct Rehearse {
     /// How obstacles are avoided: vfh.
     #[arg(long, default_value = AVOID)]
     pub avoid: String,
-    /// Where the drone stands at first: pad.
-    #[arg(long, default_value = START)]
-    pub start: String,
+    /// Where the drone stands at first, and what localization is told of it.
+    #[arg(long, value_enum, default_value_t)]
+    pub start: StartWord,
+    /// Carry the drone off by so many metres (0 to 20) once in every flight, without anything on board feeling it.
+    #[arg(long, default_value_t = 0.0)]
+    pub displaced: f64,
     /// Flights at the same time, 1 to 256; all cores when absent.
     #[arg(long)]
     pub threads: Option<usize>,
@@ -189,6 +193,28 @@ pub(crate) struct Rehearse {
     pub pictures: Option<PathBuf>,
     /// With --json: write the JSON to this file, and the table for people to standard output as without.
     pub out: Option<PathBuf>,
+}
+
+/// Where a flight starts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StartWord {
+    /// On the pad, and localization knows it.
+    #[default]
+    Pad,
+    /// Anywhere: localization is told the room.
+    Room,
+    /// Anywhere: localization is told nothing.
+    Unknown,
+}
+
+impl From<StartWord> for Begin {
+    fn from(word: StartWord) -> Self {
+        match word {
+            StartWord::Pad => Self::Pad,
+            StartWord::Room => Self::Room,
+            StartWord::Unknown => Self::Unknown,
+        }
+    }
 }
 
 /// A place and a heading, as `2.5,1.0,90`.
@@ -208,8 +234,6 @@ fn pad(text: &str) -> Result<[f32; 3], String> {
 const PAD_M: f32 = 10_000.0;
 /// The one way of avoiding obstacles that navigation has.
 const AVOID: &str = "vfh";
-/// The one place that localization starts from: it searches no building for the drone.
-const START: &str = "pad";
 /// More flights at once than any machine has cores for.
 const MOST_THREADS: usize = 256;
 /// More than a month of rehearsals.
@@ -220,12 +244,6 @@ impl Rehearse {
     pub(crate) fn check(&self, json: bool) -> Result<()> {
         if self.avoid != AVOID {
             bail!("--avoid {} is not possible: nothing implements it yet; possible is {AVOID}", self.avoid);
-        }
-        if self.start != START {
-            bail!(
-                "--start {} is not possible: localization starts from the pad only; possible is {START}",
-                self.start
-            );
         }
         if !(1..=MOST_FLIGHTS).contains(&self.flights) {
             bail!("--flights {} is out of range: allowed is 1..={MOST_FLIGHTS}", self.flights);
@@ -327,9 +345,13 @@ mod tests {
     #[test]
     fn what_nothing_implements_is_refused_with_what_is_possible() {
         assert!(refusal("--avoid vfh", "--avoid potential").contains("possible is vfh"));
-        for word in ["room", "unknown", "roof"] {
-            let said = refusal("--start pad", &format!("--start {word}"));
-            assert!(said.contains(word) && said.contains("possible is pad"), "{said}");
+        let roof = CONTRACT.replace("--start pad", "--start roof");
+        let said = Arguments::try_parse_from(roof.split_whitespace()).unwrap_err().to_string();
+        assert!(said.contains("roof") && said.contains("pad, room, unknown"), "{said}");
+        for (word, begin) in [("room", Begin::Room), ("unknown", Begin::Unknown)] {
+            let (order, json) = rehearsal(&CONTRACT.replace("--start pad", &format!("--start {word}")));
+            order.check(json).unwrap();
+            assert_eq!(Begin::from(order.start), begin);
         }
     }
 

@@ -5,8 +5,10 @@ use crate::witness::Witness;
 use airframe::picture::Picture;
 use airframe::score::FlightScore;
 use airframe::world::World;
-use anyhow::Result;
+use anyhow::{Context, Result};
+use floorplan::Rooms;
 use ipc_types::Verb;
+use localization::{LocalizationConfig, StartFrom, StartSection};
 use manifest::{Body, Manifest};
 use navigation::config::NavigationConfig;
 use runtime::{Cache, Lockstep, Start};
@@ -23,6 +25,8 @@ pub struct Setup {
     pub simulator: simulator::Config,
     /// Configuration of navigation; that of the manifest's file when absent.
     pub navigation: Option<NavigationConfig>,
+    /// Where the drone starts, and what localization is told of it.
+    pub begin: Begin,
     /// Longest flight, simulated seconds.
     pub patience_s: f64,
     /// Plans and tables shared between flights.
@@ -39,8 +43,60 @@ impl Setup {
         let (mut manifest, root) = runtime::load_manifest(&files)?;
         manifest.system.vehicle = format!("vehicles/{vehicle}.toml");
         let simulator = simulator::Config { clutter, ..simulator::Config::default() };
-        Ok(Self { manifest, root, simulator, navigation: None, patience_s, cache: Cache::default() })
+        Ok(Self {
+            manifest,
+            root,
+            simulator,
+            navigation: None,
+            begin: Begin::default(),
+            patience_s,
+            cache: Cache::default(),
+        })
     }
+
+    /// The configuration of localization with what it is told of the start.
+    fn told(&self, simulator: &simulator::Config, world: &World, seed: u64) -> Result<LocalizationConfig> {
+        let mut config = self.config::<localization::Localization>()?;
+        config.start = StartSection { from: StartFrom::Unknown, ..config.start };
+        if self.begin == Begin::Room {
+            let seed = Start::service_seed(seed, <simulator::Simulator as runtime::Service>::NAME);
+            let start =
+                Start::new(self.manifest.system.clone(), &self.root, seed, 0, true, self.cache.clone())?;
+            let place = simulator::start_place(simulator, &start, world)?;
+            let rooms = Rooms::of(&start.sidecar_name(), &start.sidecar()?, &*start.plan()?)?;
+            // A place between two rooms belongs to none.
+            if let Some(room) = rooms.room_at(place.x, place.y) {
+                config.start.from = StartFrom::Room;
+                rooms.name(room).clone_into(&mut config.start.room);
+            }
+        }
+        Ok(config)
+    }
+
+    /// The configuration file that the manifest names for a service.
+    ///
+    /// # Errors
+    /// When it is missing or wrong.
+    pub fn config<S: runtime::Service>(&self) -> Result<S::Config> {
+        let name = S::NAME;
+        let entry =
+            self.manifest.services.get(name).with_context(|| format!("the manifest has no {name}"))?;
+        let text =
+            std::fs::read_to_string(self.root.join(&entry.config)).with_context(|| entry.config.clone())?;
+        Ok(runtime::parse_config(&entry.config, &text)?)
+    }
+}
+
+/// Where the drone starts, and what localization is told of it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Begin {
+    /// On the pad.
+    #[default]
+    Pad,
+    /// Anywhere, drawn by the seed: localization is told the room.
+    Room,
+    /// Anywhere: localization is told nothing.
+    Unknown,
 }
 
 /// A flight being flown.
@@ -69,18 +125,26 @@ impl Flight {
     /// # Errors
     /// When one cannot start.
     pub fn start(setup: &Setup, seed: u64) -> Result<Self> {
+        let world = world(&setup.manifest, &setup.root, &setup.simulator, seed, &setup.cache)?;
         let mut bus = Lockstep::new(setup.manifest.clone(), &setup.root, seed, setup.cache.clone());
-        bus.add_with::<simulator::Simulator>(setup.simulator.clone())?;
+        let mut simulator = setup.simulator.clone();
+        if setup.begin != Begin::Pad {
+            "room".clone_into(&mut simulator.start);
+        }
+        bus.add_with::<simulator::Simulator>(simulator.clone())?;
         bus.add::<flight::Flight>()?;
         bus.add::<sonar::Sonar>()?;
         bus.add::<flow::Flow>()?;
         bus.add::<pilot::Pilot>()?;
-        bus.add::<localization::Localization>()?;
+        if setup.begin == Begin::Pad {
+            bus.add::<localization::Localization>()?;
+        } else {
+            bus.add_with::<localization::Localization>(setup.told(&simulator, &world, seed)?)?;
+        }
         match &setup.navigation {
             Some(config) => bus.add_with::<navigation::Navigation>(config.clone())?,
             None => bus.add::<navigation::Navigation>()?,
         }
-        let world = world(&setup.manifest, &setup.root, &setup.simulator, seed, &setup.cache)?;
         let body = vehicle_body(&setup.manifest, &setup.root, &setup.cache)?;
         let mut ports = bus.tool("cli");
         let witness = Witness::open(&mut ports, &world, body)?;

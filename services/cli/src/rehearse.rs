@@ -1,7 +1,7 @@
 //! `sereno rehearse`: the round, many times, in parallel, measured by the truth.
 
 use crate::arguments::Rehearse;
-use airframe::score::{FlightScore, Report};
+use airframe::score::{FlightScore, Report, quantile};
 use anyhow::{Context, Result, bail};
 use cli::building::Building;
 use cli::flight::{Flight, Setup};
@@ -38,6 +38,7 @@ fn setup(place: &Place, order: &Rehearse) -> Result<(Setup, Vec<String>)> {
     let text = std::fs::read_to_string(root.join(&entry.config)).with_context(|| entry.config.clone())?;
     let mut simulator: simulator::Config = runtime::parse_config(&entry.config, &text)?;
     order.clutter.clone_into(&mut simulator.clutter);
+    simulator.displaced_m = order.displaced;
     runtime::Validate::validate(&simulator)?;
     let mut navigation = None;
     if let Some(speed) = order.speed {
@@ -54,7 +55,18 @@ fn setup(place: &Place, order: &Rehearse) -> Result<(Setup, Vec<String>)> {
     let start = Start::new(manifest.system.clone(), &root, 0, 0, true, cache.clone())?;
     let Building { pad, remarks } = Building::survey(&start, order.pad)?;
     manifest.system.pad = Some([pad.x, pad.y, pad.heading_deg]);
-    Ok((Setup { manifest, root, simulator, navigation, patience_s: PATIENCE_S, cache }, remarks))
+    Ok((
+        Setup {
+            manifest,
+            root,
+            simulator,
+            navigation,
+            begin: order.start.into(),
+            patience_s: PATIENCE_S,
+            cache,
+        },
+        remarks,
+    ))
 }
 
 /// A scored flight and how much simulated time it took.
@@ -186,6 +198,29 @@ fn print(report: &Report) {
         total.min_clearance_m,
         total.real_time_factor
     );
+    let honesty = &total.honesty;
+    let hours = honesty.time_s / 3600.0;
+    let mut noticed: Vec<f32> = honesty.noticed_s.iter().flatten().map(|s| *s as f32).collect();
+    println!(
+        "P(lost): of {hours:.2} h {:.3} % wrong by over 1 m at under 1 % ({:.1} s in a row at most); became wrong {} \
+         times, {} never noticed, the others after {} s in the median, {} s at the 95th percentile; {:.2} false alarms an hour",
+        100.0 * honesty.wrong_while_sure_s / honesty.time_s.max(1e-9),
+        honesty.longest_wrong_while_sure_s,
+        honesty.noticed_s.len(),
+        honesty.noticed_s.len() - noticed.len(),
+        figure(quantile(&mut noticed, 0.5).map(f64::from)),
+        figure(quantile(&mut noticed, 0.95).map(f64::from)),
+        f64::from(honesty.false_alarms) / hours.max(1e-9),
+    );
+    for class in honesty.calibration.iter().filter(|class| class.time_s > 0.0) {
+        println!(
+            "  said {:>5.1} to {:>5.1} %: {:>8.1} s, of which {:>6.2} % wrong",
+            100.0 * class.from,
+            100.0 * class.to,
+            class.time_s,
+            100.0 * class.wrong_s / class.time_s
+        );
+    }
     for remark in &report.remarks {
         println!("{remark}");
     }

@@ -174,6 +174,7 @@ impl Witness {
             yaw: truth.yaw_rad,
             airborne,
             estimate,
+            p_lost: self.last_pose.filter(|pose| pose.searching == 0).map(|pose| pose.p_lost),
         };
         self.scorer.observe(world, &seen);
         if airborne && truth.time_s - self.last_track_s >= 0.1 {

@@ -123,10 +123,27 @@ section! {
     }
 }
 
+/// What is known of the place at the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StartFrom {
+    /// It stands on the pad, or where `x_m`, `y_m` and `heading_deg` say.
+    #[default]
+    Pad,
+    /// It stands somewhere in a room, with any heading.
+    Room,
+    /// It stands anywhere on the plan.
+    Unknown,
+}
+
 /// Where the drone starts, and how well that is known.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct StartSection {
+    /// What is known.
+    pub from: StartFrom,
+    /// Name of the room, with `from = "room"`.
+    pub room: String,
     /// Plan frame, metres; instead of the pad of the plan's sidecar file. All three or none.
     pub x_m: Option<f32>,
     /// Plan frame, metres.
@@ -144,6 +161,8 @@ pub struct StartSection {
 impl Default for StartSection {
     fn default() -> Self {
         Self {
+            from: StartFrom::Pad,
+            room: String::new(),
             x_m: None,
             y_m: None,
             heading_deg: None,
@@ -220,6 +239,20 @@ impl Validate for LocalizationConfig {
                 "start",
                 format!("{given} of x_m, y_m and heading_deg"),
                 "all three of them, or none to start on the plan's pad",
+            ));
+        }
+        if given != 0 && start.from != StartFrom::Pad {
+            return Err(ConfigError::range(
+                "start.from",
+                "a search",
+                "pad, where x_m, y_m and heading_deg are given",
+            ));
+        }
+        if start.room.is_empty() == (start.from == StartFrom::Room) {
+            return Err(ConfigError::range(
+                "start.room",
+                format!("\"{}\"", start.room),
+                "the name of a room with from = \"room\", empty otherwise",
             ));
         }
         for (field, value) in [("start.x_m", start.x_m), ("start.y_m", start.y_m)] {

@@ -13,6 +13,7 @@ mod news;
 mod pose;
 mod predict;
 mod rate;
+mod seek;
 mod service;
 mod set;
 mod start;
@@ -21,7 +22,7 @@ mod velocity;
 
 pub use attitude::{Attitudes, Mean};
 pub use config::{
-    LocalizationConfig, MotionSection, PopulationSection, SonarSection, StartSection, TrustSection,
+    LocalizationConfig, MotionSection, PopulationSection, SonarSection, StartFrom, StartSection, TrustSection,
 };
 pub use flow::Flows;
 pub use service::Localization;

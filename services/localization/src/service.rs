@@ -1,5 +1,6 @@
 //! The service.
 
+mod seeking;
 mod update;
 
 use crate::LocalizationConfig;
@@ -8,15 +9,16 @@ use crate::clutter::Clutter;
 use crate::flow::{Flows, Frame};
 use crate::news::News;
 use crate::pose::{Walls, fill};
-use crate::set::{MEMORY_GROUNDED, Set, columns, fold};
-use crate::start::{Place, place};
+use crate::seek::{Seek, Why};
+use crate::set::{MEMORY_GROUNDED, MEMORY_SEEKING, Set, columns, fold};
+use crate::start::{From, from};
 use crate::sweep::{Group, Waiting};
 use crate::velocity::Velocity;
 use floorplan::{ConeModel, ConeTable};
 use ipc_types::{
     Attitude, FlowMotion, LocalizationState, MAX_PARTICLES, Particles, PilotState, Pose, SonarRanges, Text,
 };
-use mcl::{Estimate, Filter, Memory};
+use mcl::{Estimate, Filter, Lattice, Memory};
 use runtime::{Input, Output, Ports, Service, Start, StartError};
 use std::fmt::Write;
 use std::sync::Arc;
@@ -46,7 +48,7 @@ pub struct Localization {
     /// The sonars as the velocity looks through them: exactly, and as wide as large things are heard.
     cone: ConeModel,
     plan: u32,
-    pad: Place,
+    from: From,
     seed: u64,
 
     attitudes: Attitudes,
@@ -61,10 +63,13 @@ pub struct Localization {
     news: News,
     clutter: Clutter,
     set: Set,
+    seek: Seek,
     /// Number and time of the last set sent.
     sent: u64,
     sent_ns: u64,
     grounded: bool,
+    /// The level error (roll, pitch) that the attitude told on the ground, while nothing else tells it.
+    rest_level: [f32; 2],
     believed: Option<Believed>,
     next_pose_ns: u64,
     refused: u64,
@@ -84,8 +89,12 @@ impl Service for Localization {
 
     fn start(config: LocalizationConfig, ports: &mut Ports, start: &Start) -> Result<Self, StartError> {
         let plan = start.plan()?;
-        let pad = place(&config.start, start, &plan)?;
+        let begins = from(&config.start, start, &plan)?;
         let hash = fold(plan.hash());
+        let lattice = start
+            .shared(&format!("lattice {} {}", start.system.plan, start.vehicle.body.radius_m), || {
+                Ok(Lattice::new(&plan, start.vehicle.body.radius_m))
+            })?;
         let model = ConeModel { max_range_m: config.sonar.max_range, ..ConeModel::default() };
         let table = start.shared(&format!("cone table {} {model:?}", start.system.plan), || {
             ConeTable::new(plan, model).map_err(StartError::invalid)
@@ -93,6 +102,11 @@ impl Service for Localization {
         let filter =
             Filter::new(config.filter(), Arc::clone(&table), MAX_PARTICLES).map_err(StartError::invalid)?;
         let clutter = Clutter::new(table.plan(), start.sidecar()?.doors);
+        let room = match &begins {
+            From::Room { rooms, room } => Some((Arc::clone(rooms), *room)),
+            From::Pad(_) | From::Unknown => None,
+        };
+        let seek = Seek::new(lattice, &config.filter().sonar, room);
         let mut service = Self {
             ranges: ports.input()?,
             attitude: ports.input()?,
@@ -106,7 +120,7 @@ impl Service for Localization {
             table,
             cone: ConeModel { half_angle_rad: WIDE_RAD, sub_rays: WIDE_RAYS, ..model },
             plan: hash,
-            pad,
+            from: begins,
             seed: start.seed,
             attitudes: Attitudes::default(),
             flows: Flows::default(),
@@ -118,9 +132,11 @@ impl Service for Localization {
             news: News::default(),
             clutter,
             set: Set::None,
+            seek,
             sent: 0,
             sent_ns: 0,
             grounded: true,
+            rest_level: [0.0; 2],
             believed: None,
             next_pose_ns: 0,
             refused: 0,
@@ -128,12 +144,17 @@ impl Service for Localization {
         if let Some(kept) = ports.retained::<Particles>()? {
             service.resume(kept);
         }
+        if matches!(service.set, Set::None) && !matches!(service.from, From::Pad(_)) {
+            service.seek_from_nothing();
+        }
         Ok(service)
     }
 
     fn step(&mut self, now: u64) {
         self.listen(now);
-        if self.set_is_back(now) {
+        if self.seek.why() == Some(Why::Start) {
+            self.seek_on(now);
+        } else if self.set_is_back(now) {
             self.advance(now);
         }
         self.publish(now);
@@ -143,6 +164,13 @@ impl Service for Localization {
         // A text that is full is full.
         let _ = match &self.believed {
             None => write!(text, "waiting for the attitude"),
+            Some(_) if self.seek.why() == Some(Why::Start) => {
+                write!(
+                    text,
+                    "searching the plan for the drone, {:.0} % sure of one place",
+                    100.0 * self.seek.share()
+                )
+            }
             Some(b) => {
                 let e = &b.estimate;
                 let state = match e.state {
@@ -179,11 +207,16 @@ impl Localization {
             self.refused += 1;
             return;
         }
+        self.grounded = kept.memory[MEMORY_GROUNDED] == 1.0;
+        if kept.memory[MEMORY_SEEKING] == 1.0 {
+            // Hypotheses only: they are searched for anew.
+            self.sent = kept.updates;
+            return;
+        }
         // What happened meanwhile is unknown: search with all there is.
         let mut memory = Memory::from_array(&kept.memory);
         memory.wanted = self.config.population.max as f32;
-        self.grounded = kept.memory[MEMORY_GROUNDED] == 1.0;
-        kept.memory[..15].copy_from_slice(&memory.to_array()[..15]);
+        kept.memory[..MEMORY_SEEKING].copy_from_slice(&memory.to_array()[..MEMORY_SEEKING]);
         self.sent = kept.updates;
         self.set = Set::Kept(kept);
     }
@@ -297,6 +330,10 @@ impl Localization {
         if let Some(mut pose) = self.poses.loan() {
             fill(&mut pose, now, &b.estimate, &p, b.count, walls);
             pose.adrift_ns = self.adrift_ns;
+            if self.seek.why() == Some(Why::Check) {
+                pose.p_lost = pose.p_lost.max(seeking::UNCHECKED_DOUBT);
+            }
+            pose.searching = u32::from(self.seek.why() == Some(Why::Start));
             pose.send();
         }
         self.next_pose_ns = now + (1e9 / self.config.pose_hz) as u64;

@@ -7,6 +7,9 @@ use runtime::Guard;
 /// Entry of [`Particles::memory`], after those of [`mcl::Memory`]: 1 while the skids were on the ground.
 pub(crate) const MEMORY_GROUNDED: usize = 15;
 
+/// And the one before: 1 while the set was what competed in a search.
+pub(crate) const MEMORY_SEEKING: usize = 14;
+
 /// The last set.
 pub(crate) enum Set {
     /// None yet: the first one is drawn around the start.

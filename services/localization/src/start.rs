@@ -1,8 +1,40 @@
-//! Where the drone starts: the system's pad, or what the configuration says.
+//! Where the drone starts: the system's pad, what the configuration says, a room, or nobody knows.
 
-use crate::StartSection;
-use floorplan::{Cell, Plan};
+use crate::{StartFrom, StartSection};
+use floorplan::{Cell, Plan, Rooms};
 use runtime::{Start, StartError};
+use std::sync::Arc;
+
+/// What is known at the start.
+pub(crate) enum From {
+    /// Place and heading.
+    Pad(Place),
+    /// The room, by its number.
+    Room { rooms: Arc<Rooms>, room: usize },
+    /// Nothing.
+    Unknown,
+}
+
+pub(crate) fn from(config: &StartSection, start: &Start, plan: &Plan) -> Result<From, StartError> {
+    match config.from {
+        StartFrom::Pad => place(config, start, plan).map(From::Pad),
+        StartFrom::Unknown => Ok(From::Unknown),
+        StartFrom::Room => {
+            let rooms =
+                Rooms::of(&start.sidecar_name(), &start.sidecar()?, plan).map_err(StartError::invalid)?;
+            let names = || (0..rooms.len()).map(|room| rooms.name(room));
+            let room = names().position(|name| name == config.room).ok_or_else(|| {
+                StartError::Invalid(format!(
+                    "start.room is \"{}\"; rooms of {}: {}",
+                    config.room,
+                    start.system.plan,
+                    names().collect::<Vec<_>>().join(", ")
+                ))
+            })?;
+            Ok(From::Room { rooms: Arc::new(rooms), room })
+        }
+    }
+}
 
 /// A place and a heading in the plan frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +44,7 @@ pub(crate) struct Place {
     pub(crate) heading: f32,
 }
 
-pub(crate) fn place(config: &StartSection, start: &Start, plan: &Plan) -> Result<Place, StartError> {
+fn place(config: &StartSection, start: &Start, plan: &Plan) -> Result<Place, StartError> {
     let from_config = match (config.x_m, config.y_m, config.heading_deg) {
         (Some(x), Some(y), Some(heading)) => Some(Place { x, y, heading: heading.to_radians() }),
         _ => None,

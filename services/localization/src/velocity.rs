@@ -147,6 +147,26 @@ impl Velocity {
         self.yaw = None;
     }
 
+    /// The plan's frame turns out to lie otherwise: what was x and y so far is turned by `angle`, and the place is this one.
+    pub(crate) fn turn(&mut self, time_ns: u64, place: [f32; 2], angle: f32) {
+        let (sin, cos) = f64::from(angle).sin_cos();
+        let mut turned = [[0.0; STATES]; STATES];
+        for (i, row) in turned.iter_mut().enumerate() {
+            row[i] = 1.0;
+        }
+        for i in [PLACE, SPEED, UNTOLD] {
+            (turned[i][i], turned[i][i + Y]) = (cos, -sin);
+            (turned[i + Y][i], turned[i + Y][i + Y]) = (sin, cos);
+            let [x, y] = [self.filter.state[i], self.filter.state[i + Y]];
+            (self.filter.state[i], self.filter.state[i + Y]) = (cos * x - sin * y, sin * x + cos * y);
+        }
+        self.filter.carry(&turned);
+        for axis in 0..2 {
+            self.filter.set(PLACE + Y * axis, place[axis], PLACE_M);
+        }
+        (self.time_ns, self.pings) = (time_ns, Default::default());
+    }
+
     fn settle(&mut self, level: [f32; 2], untold: f32) {
         for (axis, error) in tilted(&Tilt::default(), level).into_iter().enumerate() {
             self.filter.set(UNTOLD + Y * axis, 0.0, untold);

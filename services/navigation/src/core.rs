@@ -6,6 +6,7 @@ use crate::aside::Courtesy;
 use crate::atlas::Atlas;
 use crate::blockage::Blockage;
 use crate::config::NavigationConfig;
+use crate::explore::Explore;
 use crate::journey::{Journey, Work};
 use crate::mission::{Event, Goal, Heard, Intent, Mission, Nonsense};
 use crate::place::Place;
@@ -34,6 +35,9 @@ pub struct Core {
     config: NavigationConfig,
     atlas: Arc<Atlas>,
     place: Option<Place>,
+    /// Grids from before this are in another frame.
+    frame_ns: u64,
+    explore: Explore,
     senses: Senses,
     beams: Vec<avoid::Beam>,
     rules: GridRules,
@@ -70,6 +74,8 @@ impl Core {
             config,
             atlas,
             place: None,
+            frame_ns: 0,
+            explore: Explore::default(),
             beams: Vec::with_capacity(MAX_BEAMS),
             rules: GridRules::default(),
             walls: WallLayer::new(),
@@ -132,8 +138,28 @@ impl Core {
     /// A new estimate.
     pub fn pose(&mut self, pose: &Pose) {
         match Place::of(pose, self.place.as_ref()) {
-            Some(place) => self.place = Some(place),
+            Some(place) => {
+                if self.place.is_some_and(|last| place.jumped(&last)) {
+                    self.jump(&place);
+                }
+                self.place = Some(place);
+            }
             None => self.refused += 1,
+        }
+    }
+
+    /// What was noted in the plan's frame lies elsewhere now: the grid begins anew, and so does the way.
+    fn jump(&mut self, place: &Place) {
+        self.frame_ns = place.stamp_ns;
+        self.beams.clear();
+        self.explore.forget();
+        self.steering.forget();
+        self.blockage.reset();
+        self.courtesy.forget();
+        self.stand = None;
+        self.mission.replanning(place);
+        if self.mission.goal() != Goal::None {
+            self.journey.plan();
         }
     }
 
@@ -207,6 +233,7 @@ impl Core {
         };
         let known = last
             .filter(|grid| (grid.cell_m - CELL_M).abs() < 1e-6 && grid.header.stamp_ns <= now)
+            .filter(|grid| grid.header.stamp_ns > self.frame_ns)
             .and_then(|grid| Window::from_origin(grid.origin_x_m, grid.origin_y_m).map(|from| (grid, from)));
         match known {
             Some((grid, from)) => {
@@ -236,6 +263,10 @@ impl Core {
             self.journey.see(&place);
         }
         let hearing = self.senses.fresh(now, self.config.ranges_age_s);
+        if let Some(place) = place.filter(|place| place.searching) {
+            write_polar(polar, None);
+            return self.search(now, dt_s, &place, grid.filter(|_| hearing));
+        }
         let planned = self.journey.planned();
         let intent = self.mission.intent(place.as_ref(), planned, self.config.pad_m, dt_s);
         let window = grid.and_then(|grid| Window::from_origin(grid.origin_x_m, grid.origin_y_m));
@@ -260,9 +291,25 @@ impl Core {
         setpoint
     }
 
+    /// A setpoint while nobody knows where on the plan the drone is.
+    fn search(&mut self, now: u64, dt_s: f32, place: &Place, grid: Option<&Grid>) -> Setpoint {
+        let mut setpoint = blank_setpoint(now, &self.config);
+        let window = grid.and_then(|grid| Window::from_origin(grid.origin_x_m, grid.origin_y_m));
+        if let (Some(grid), Some(window), true) = (grid, window, self.mission.heeded()) {
+            let radius = self.steering.craft().radius_m;
+            let wish = self.explore.step(now, dt_s, place, &grid.cells, &window, radius);
+            setpoint.kind = u32::from(SetpointKind::Velocity.code());
+            (setpoint.velocity_x_m_s, setpoint.velocity_y_m_s) = wish.velocity;
+            setpoint.heading_rad = wish.heading;
+        }
+        self.text = Text::new("looking for the drone's place on the plan");
+        setpoint
+    }
+
     /// Works one bounded slice of a route that is being planned: to be called when the setpoint is out.
     pub fn plan_on(&mut self, now: u64) {
-        let Some(place) = self.fresh_place(now) else {
+        // No way leads from a place that is not on the plan.
+        let Some(place) = self.fresh_place(now).filter(|place| !place.searching) else {
             return;
         };
         if self.courtesy.over(now, &self.senses)

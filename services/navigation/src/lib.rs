@@ -23,6 +23,7 @@ pub mod atlas;
 pub mod blockage;
 pub mod config;
 pub mod core;
+pub mod explore;
 pub mod fence;
 pub mod journey;
 pub mod mission;

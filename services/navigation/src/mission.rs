@@ -153,7 +153,8 @@ impl Mission {
     }
 
     /// Whether the pilot flies navigation's wishes now.
-    fn heeded(&self) -> bool {
+    #[must_use]
+    pub fn heeded(&self) -> bool {
         self.phase == Phase::Autonomous
             && matches!(self.failsafe, FailsafeAction::None | FailsafeAction::Return)
     }

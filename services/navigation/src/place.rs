@@ -10,6 +10,10 @@ const LONGEST_CARRY_S: f64 = 0.3;
 /// Turn rates beyond this are jumps of the estimate, radians a second.
 const FASTEST_TURN_RAD_S: f32 = 3.0;
 
+/// A place farther from where the last one led is another place, metres: a gust moves nobody half a metre in 20 ms, and
+/// estimates are corrected by centimetres.
+const JUMP_M: f32 = 0.5;
+
 /// A pose that makes sense.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
@@ -33,6 +37,8 @@ pub struct Place {
     pub velocity_sigma: f32,
     /// Whether localization believes in it.
     pub tracking: bool,
+    /// Whether it is in a frame of localization's own, while that searches the plan.
+    pub searching: bool,
 }
 
 impl Place {
@@ -71,7 +77,8 @@ impl Place {
             } else {
                 1.0
             },
-            tracking: state == LocalizationState::Tracking,
+            tracking: state == LocalizationState::Tracking && pose.searching == 0,
+            searching: pose.searching != 0,
         })
     }
 
@@ -85,6 +92,13 @@ impl Place {
             heading: wrap(self.heading + self.turn * dt),
             ..*self
         }
+    }
+
+    /// Whether the plan's frame has moved since `last`: what was noted in it then lies elsewhere now.
+    #[must_use]
+    pub fn jumped(&self, last: &Self) -> bool {
+        self.searching != last.searching
+            || self.distance((last.at(self.stamp_ns).x, last.at(self.stamp_ns).y)) > JUMP_M
     }
 
     /// Seconds since it was true.

@@ -118,6 +118,8 @@ impl Senses {
         let angle_rad = avoid::wrap(then.heading + reading.bearing_rad);
         let echo = match range {
             None => Echo::Silence(SILENT_REACH_M),
+            // Where on the plan it is, nobody knows yet.
+            Some(range) if place.searching => Echo::Obstacle(range),
             Some(range) if mapped(plan, x_m, y_m, angle_rad, range, place.sigma) => Echo::Mapped(range),
             Some(range) => Echo::Obstacle(range),
         };

@@ -157,6 +157,12 @@ impl Steering {
         })
     }
 
+    /// The vehicle.
+    #[must_use]
+    pub fn craft(&self) -> Craft {
+        self.craft
+    }
+
     /// Starts afresh: the next wished heading is the present one, the speed grows from nothing.
     pub fn forget(&mut self) {
         self.roomy.forget();

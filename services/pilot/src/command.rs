@@ -195,7 +195,7 @@ impl PilotCore {
             write!(out, "refused: {silent} of the side sonars silent")
         } else if age_s(self.pose.at, now) > policy.pose_stale_s.max(0.5) {
             out.write_str("refused: the localization is silent")
-        } else if !self.place_known() {
+        } else if !self.place_known() && !self.searching() {
             out.write_str("refused: the drone does not know where it is")
         } else {
             return false;

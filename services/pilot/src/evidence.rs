@@ -39,6 +39,7 @@ impl PilotCore {
         let fresh_setpoint = self.fresh_setpoint(now).is_some();
         let (silent, sides) = self.shield.silent(now);
         let place_known = self.place_known();
+        let searching = self.searching();
         let cell = self.cell_volts(now);
         let uncovered = self.home_uncovered(now);
         let link = age_s(self.flight.at, now) > 1.0 || self.flight.link != LinkState::Up;
@@ -55,7 +56,8 @@ impl PilotCore {
             navigation_silent_s: t.navigation.update(now, autonomous && !fresh_setpoint, 0.0),
             side_sonar_silent_s: t.side.update(now, silent > 0, CLEAR_S),
             all_sonars_silent_s: t.all_sides.update(now, sides > 0 && silent == sides, 0.0),
-            pose_uncertain_s: t.pose.update(now, !place_known, CLEAR_S),
+            pose_uncertain_s: t.pose.update(now, !place_known && !searching, CLEAR_S),
+            searching_s: t.searching.update(now, searching && airborne, CLEAR_S),
             few_walls_s: t.walls.update(now, few_walls, CLEAR_S),
             adrift_s: adrift.map_or(0.0, |since| age_s(Some(since), now)),
             home_uncovered_s: t.home.update(now, uncovered == Some(true), CLEAR_VOLTS_S),
@@ -88,7 +90,13 @@ impl PilotCore {
         }
         let drawn = self.flight.drawn_mah;
         let fresh = age_s(self.flight.power_at, now) <= self.config.failsafe.power_stale_s;
-        let length = self.home_m.filter(|_| fresh && drawn.is_finite())?;
+        let length = if self.searching() {
+            // It may be anywhere.
+            self.way_home.as_ref().and_then(control::WayHome::longest_m)
+        } else {
+            self.home_m
+        };
+        let length = length.filter(|_| fresh && drawn.is_finite())?;
         let measured = self.flight.amps > 0.5;
         let amps = if measured { self.flight.amps } else { self.craft.capacity_mah * 1e-3 / HOVER_HOURS };
         let seconds = length / (HOME_PACE * self.craft.cruise_m_s).max(0.05) + MEETING_S + LANDING_S;

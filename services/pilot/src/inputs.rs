@@ -2,7 +2,7 @@
 
 use crate::core::PilotCore;
 use crate::senses::SetpointSeen;
-use control::{Echo, Look, Tilt, Vector};
+use control::{Echo, Look, Tilt, Vector, wrap_angle};
 use ipc_types::{
     Attitude, FlightState, FlowMotion, Patrol, PatrolState, Phase, Pose, Power, Setpoint, SonarHealth,
     SonarRanges, SonarStatus,
@@ -10,6 +10,10 @@ use ipc_types::{
 
 /// Speed of sound at 20 C, m/s, to place an echo in time.
 const SOUND_M_S: f32 = 343.0;
+
+/// A pose farther from the place than this is another place, metres: no correction is as large, and no gust moves the
+/// drone so far between two poses.
+const JUMP_M: f32 = 0.5;
 
 impl PilotCore {
     /// Takes an attitude.
@@ -32,10 +36,26 @@ impl PilotCore {
 
     /// Takes a pose.
     pub fn pose(&mut self, message: &Pose) {
-        match self.pose.take(message) {
-            Some((at, place, velocity)) => self.motion.correct(at, place, velocity),
-            None => self.refused += 1,
+        let before = self.pose.at.map(|_| (self.pose.heading_offset, self.motion.place()));
+        let Some((at, place, velocity)) = self.pose.take(message) else {
+            self.refused += 1;
+            return;
+        };
+        if let Some((offset, last)) = before
+            && (place - last).norm() > JUMP_M
+        {
+            self.follow_jump(wrap_angle(self.pose.heading_offset - offset));
         }
+        self.motion.correct(at, place, velocity);
+    }
+
+    /// Localization has found another place: what was noted in the plan's frame lies elsewhere, and turned.
+    fn follow_jump(&mut self, turned: f32) {
+        self.hold = None;
+        self.looks_from = None;
+        self.hold_heading = self.hold_heading.map(|heading| wrap_angle(heading + turned));
+        let learned = self.velocity.learned();
+        self.velocity.set_learned(learned.rotated(turned));
     }
 
     /// Takes what the controller and its link are doing.

@@ -68,6 +68,8 @@ pub(crate) struct PoseSeen {
     /// Since when nothing holds the velocity.
     pub(crate) adrift: Option<u64>,
     pub(crate) state: LocalizationState,
+    /// Localization searches the plan: the frame is its own.
+    pub(crate) searching: bool,
 }
 
 impl Default for PoseSeen {
@@ -83,6 +85,7 @@ impl Default for PoseSeen {
             walls: 0,
             adrift: None,
             state: LocalizationState::Lost,
+            searching: false,
         }
     }
 }
@@ -114,6 +117,7 @@ impl PoseSeen {
             walls: message.walls_in_echo,
             adrift: (message.adrift_ns > 0).then_some(message.adrift_ns),
             state,
+            searching: message.searching != 0,
         };
         Some((message.estimated_ns, place, velocity))
     }

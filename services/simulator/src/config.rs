@@ -21,6 +21,8 @@ pub struct Config {
     pub charge: f64,
     /// Names of sonars that never answer.
     pub dead_sonars: Vec<String>,
+    /// Once in flight the drone is suddenly so far from where it was, metres, and nothing on board has felt it; 0: never.
+    pub displaced_m: f64,
 }
 
 impl Default for Config {
@@ -32,6 +34,7 @@ impl Default for Config {
             failsafe: "factory".to_owned(),
             charge: 1.0,
             dead_sonars: Vec::new(),
+            displaced_m: 0.0,
         }
     }
 }
@@ -50,6 +53,7 @@ impl Validate for Config {
         if !FAILSAFES.contains(&self.failsafe.as_str()) {
             return Err(ConfigError::range("failsafe", &self.failsafe, FAILSAFES.join(", ")));
         }
+        within("displaced_m", self.displaced_m, 0.0..=20.0)?;
         within("charge", self.charge, 0.05..=1.0)
     }
 }
@@ -96,6 +100,7 @@ impl Config {
             start: start_place(&self.start).unwrap_or_default(),
             charge: self.charge,
             dead_sonars,
+            displaced_m: self.displaced_m,
         })
     }
 }
@@ -120,6 +125,7 @@ mod tests {
             (Config { start: "roof".into(), ..Config::default() }, "start"),
             (Config { firmware: "inav".into(), ..Config::default() }, "firmware"),
             (Config { failsafe: "hope".into(), ..Config::default() }, "failsafe"),
+            (Config { displaced_m: -1.0, ..Config::default() }, "displaced_m"),
             (Config { charge: f64::NAN, ..Config::default() }, "charge"),
         ] {
             let error = config.validate().unwrap_err().to_string();

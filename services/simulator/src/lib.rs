@@ -12,4 +12,4 @@ mod world;
 pub use config::Config;
 pub use pty::PtyDevices;
 pub use service::Simulator;
-pub use world::{build_world, world_pad};
+pub use world::{build_world, start_place, world_pad};

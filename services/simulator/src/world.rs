@@ -1,6 +1,7 @@
 //! The world of a flight, for the simulator and for scorers.
 
 use crate::Config;
+use airframe::simulation::Simulation;
 use airframe::world::{World, WorldFile};
 use floorplan::{DistanceField, Pad, Sidecar};
 use runtime::{Start, StartError};
@@ -32,6 +33,17 @@ pub fn build_world(config: &Config, start: &Start) -> Result<World, StartError> 
     }
     let side = Sidecar { pad, ..start.sidecar()? };
     World::build(&plan, &side, &file, config.clutter(), start.seed).map_err(StartError::invalid)
+}
+
+/// Where the simulator puts the drone down at first in a world of [`build_world`], with the same configuration and start:
+/// for whoever has to tell localization the room, or to score.
+///
+/// # Errors
+/// A configuration that names what the vehicle does not have.
+pub fn start_place(config: &Config, start: &Start, world: &World) -> Result<Pad, StartError> {
+    let options = config.options(&start.vehicle, start.seed)?;
+    let place = Simulation::start_place(world, &start.vehicle, &options);
+    Ok(Pad { x: place.x, y: place.y, heading_deg: place.heading.to_degrees() })
 }
 
 /// The pad that the system's world file names, if it names one: for whoever decides the system's pad before it

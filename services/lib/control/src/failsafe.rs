@@ -79,6 +79,8 @@ pub struct Evidence {
     pub all_sonars_silent_s: f32,
     /// The pose is stale, not tracked, or beyond the policy's P(lost) or sigma.
     pub pose_uncertain_s: f32,
+    /// Localization has been searching the plan for the drone since it is in the air.
+    pub searching_s: f32,
     /// The pose is uncertain *and* fewer than two walls answer.
     pub few_walls_s: f32,
     /// The pose is uncertain *and* nothing holds the velocity: a hover would drift.
@@ -119,6 +121,8 @@ pub struct Policy {
     pub pose_hover_s: f32,
     /// Pose uncertain: come down.
     pub pose_land_s: f32,
+    /// The place on the plan was looked for in vain: come down.
+    pub search_land_s: f32,
     /// Pose uncertain and fewer than two walls in echo: come down.
     pub walls_land_s: f32,
     /// Pose uncertain and adrift: come down.
@@ -169,6 +173,7 @@ impl Default for Policy {
             pose_stale_s: 0.3,
             pose_hover_s: 1.0,
             pose_land_s: 20.0,
+            search_land_s: 120.0,
             walls_land_s: 5.0,
             drift_land_s: 1.5,
             sonars_hover_s: 0.5,
@@ -201,6 +206,7 @@ impl Policy {
         within("failsafe.pose_stale_s", self.pose_stale_s, 0.1, 2.0)?;
         within("failsafe.pose_hover_s", self.pose_hover_s, 0.1, 5.0)?;
         within("failsafe.pose_land_s", self.pose_land_s, 2.0, 120.0)?;
+        within("failsafe.search_land_s", self.search_land_s, 10.0, 300.0)?;
         within("failsafe.walls_land_s", self.walls_land_s, 1.0, 60.0)?;
         within("failsafe.drift_land_s", self.drift_land_s, 0.5, 60.0)?;
         within("failsafe.sonars_hover_s", self.sonars_hover_s, 0.1, 2.0)?;
@@ -249,7 +255,7 @@ pub struct Row {
 
 /// The table, with what `e` says about each row. Its order means nothing: the most severe wins.
 #[must_use]
-pub fn table(e: &Evidence, p: &Policy) -> [Row; 21] {
+pub fn table(e: &Evidence, p: &Policy) -> [Row; 22] {
     let navigation = if e.autonomous { e.navigation_silent_s } else { 0.0 };
     let row = |cause, lasted_s, after_s, action, what| Row { cause, after_s, lasted_s, action, what };
     let ordered = e.operator.unwrap_or(Action::None);
@@ -260,6 +266,7 @@ pub fn table(e: &Evidence, p: &Policy) -> [Row; 21] {
         row(Cause::SideSonarSilent, e.side_sonar_silent_s, 0.0, Action::None, "a side sonar is silent"),
         row(Cause::PoseUncertain, e.pose_uncertain_s, p.pose_hover_s, Action::Hover, "pose uncertain"),
         row(Cause::Lost, e.pose_uncertain_s, p.pose_land_s, Action::Descend, "pose uncertain"),
+        row(Cause::Lost, e.searching_s, p.search_land_s, Action::Descend, "place searched for in vain"),
         row(
             Cause::Lost,
             e.few_walls_s,

@@ -19,6 +19,7 @@ pub struct WayHome {
     queue: std::collections::VecDeque<u32>,
     queued: Vec<bool>,
     home: Option<Vector>,
+    longest_m: f32,
 }
 
 impl WayHome {
@@ -43,6 +44,7 @@ impl WayHome {
             queued: vec![false; open.len()],
             open,
             home: None,
+            longest_m: 0.0,
         }
     }
 
@@ -89,6 +91,14 @@ impl WayHome {
                 }
             }
         }
+        let lengths = self.length_m.iter().filter(|length| length.is_finite());
+        self.longest_m = lengths.fold(0.0, |most, length| f32::max(most, *length));
+    }
+
+    /// The longest way home from anywhere, metres; `None` without a home.
+    #[must_use]
+    pub fn longest_m(&self) -> Option<f32> {
+        self.home.map(|_| self.longest_m)
     }
 
     /// Length of the way home from a place, metres; `None` without a home or a way.
@@ -132,11 +142,12 @@ mod tests {
         let walls = DistanceField::new(&plan, 2.0);
         let origin = Vector::new(plan.origin().0, plan.origin().1);
         let mut way = WayHome::new(&walls, origin, Vector::new(6.4, 3.6), 0.3);
-        assert_eq!(way.length_m(Vector::new(5.0, 1.0)), None);
+        assert_eq!((way.length_m(Vector::new(5.0, 1.0)), way.longest_m()), (None, None));
         way.set_home(origin + Vector::new(1.6, 0.8));
         let from = origin + Vector::new(4.8, 0.8);
         let length = way.length_m(from).unwrap();
         assert!((4.5..7.0).contains(&length), "over the door, not through the wall: {length}");
         assert!(way.length_m(origin + Vector::new(-5.0, 0.0)).is_none());
+        assert!((length..10.0).contains(&way.longest_m().unwrap()));
     }
 }

@@ -107,6 +107,7 @@ fn evidence() -> impl Strategy<Value = Evidence> {
             tilt_s: s[10],
             adrift_s: s[11],
             charge_unknown_s: s[12],
+            searching_s: s[13],
             operator: Action::ALL.get(operator).copied(),
         })
 }

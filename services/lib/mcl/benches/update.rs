@@ -82,6 +82,7 @@ fn update_at(c: &mut Criterion, name: &str, table: &Arc<ConeTable>, (x, y): (f32
             level_roll: 0.0,
             level_pitch: 0.0,
             level_sigma: 0.01,
+            velocity: [0.0; 2],
             p_lost: 0.0,
         };
         let mut memory = filter.start_at(&start, old.write(), &mut generator).memory;

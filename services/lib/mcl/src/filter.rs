@@ -69,6 +69,8 @@ pub struct Start {
     pub level_pitch: f32,
     /// Standard deviation of each, radians.
     pub level_sigma: f32,
+    /// Plan frame, m/s.
+    pub velocity: [f32; 2],
     /// Doubt to begin with, 0..=1.
     pub p_lost: f32,
 }
@@ -128,7 +130,7 @@ impl<M: RangeMap> Filter<M> {
         &self.map
     }
 
-    /// Writes a set around a known place into `next`, at rest.
+    /// Writes a set around a known place into `next`.
     pub fn start_at(
         &mut self,
         start: &Start,
@@ -137,7 +139,40 @@ impl<M: RangeMap> Filter<M> {
     ) -> Update {
         let count = self.config.population.max.min(next.capacity()).min(self.ancestors.len());
         let mut lanes = Lanes::new(generator);
-        let mut from = 0;
+        self.draw(start, &mut next, 0, count, &mut lanes);
+        next.weight[..count].fill(1.0 / count as f32);
+        self.begin(count, start.p_lost, &next)
+    }
+
+    /// Writes a set around places of which each may be the one, with the share of the belief that it has.
+    pub fn start_among(
+        &mut self,
+        starts: impl Iterator<Item = (Start, f32)>,
+        p_lost: f32,
+        mut next: ParticlesMut<'_>,
+        generator: &mut Generator,
+    ) -> Update {
+        let room = self.config.population.max.min(next.capacity()).min(self.ancestors.len());
+        let mut lanes = Lanes::new(generator);
+        let mut count = 0;
+        for (start, share) in starts {
+            let more = ((share.clamp(0.0, 1.0) * room as f32) as usize).min(room - count);
+            self.draw(&start, &mut next, count, count + more, &mut lanes);
+            count += more;
+        }
+        next.weight[..count].fill(1.0 / count.max(1) as f32);
+        self.begin(count, p_lost, &next)
+    }
+
+    /// Draws the particles `from..count` around a place.
+    fn draw(
+        &mut self,
+        start: &Start,
+        next: &mut ParticlesMut<'_>,
+        mut from: usize,
+        count: usize,
+        lanes: &mut Lanes,
+    ) {
         while from < count {
             let to = (from + BLOCK).min(count);
             for row in self.noise.iter_mut() {
@@ -153,15 +188,18 @@ impl<M: RangeMap> Filter<M> {
                 block.level_roll[i] = start.level_roll + start.level_sigma * nr[i];
                 block.level_pitch[i] = start.level_pitch + start.level_sigma * np[i];
             }
-            block.velocity_x.fill(0.0);
-            block.velocity_y.fill(0.0);
-            block.weight.fill(1.0 / count as f32);
+            block.velocity_x.fill(start.velocity[0]);
+            block.velocity_y.fill(start.velocity[1]);
             from = to;
         }
+    }
+
+    /// What is to be said of a set that was drawn.
+    fn begin(&mut self, count: usize, p_lost: f32, next: &ParticlesMut<'_>) -> Update {
         let (estimate, spread) = self.summary.of(&next.written(count));
-        let estimate = estimate.doubted(start.p_lost.clamp(0.0, 1.0));
+        let estimate = estimate.doubted(p_lost.clamp(0.0, 1.0));
         let memory = Memory {
-            p_lost: start.p_lost.clamp(0.0, 1.0),
+            p_lost: p_lost.clamp(0.0, 1.0),
             effective: estimate.effective,
             wanted: self.wanted(&estimate, spread),
         };

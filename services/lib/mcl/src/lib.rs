@@ -30,6 +30,7 @@ mod maths;
 mod motion;
 mod particles;
 mod resample;
+mod search;
 mod sonar;
 mod trust;
 
@@ -42,5 +43,6 @@ pub use maths::wrap_angle;
 pub use motion::{Flow, Motion, MotionConfig, noisy_distance};
 pub use particles::{ParticlesError, ParticlesMut, ParticlesRef};
 pub use resample::draw_ancestors;
+pub use search::{Hypothesis, Lattice, MAX_HEARD, Search, Trail, TrailPose, Turns};
 pub use sonar::{Echo, MAX_READINGS, Reading, SonarModel, Sweep};
 pub use trust::TrustConfig;

@@ -1,10 +1,12 @@
 //! From one set to the next.
 
 use super::{Believed, Localization};
-use crate::attitude::seconds;
+use crate::attitude::{Tilt, seconds};
 use crate::clutter::Ear;
 use crate::predict::{Dynamics, predict};
-use crate::set::{MEMORY_GROUNDED, columns, columns_mut};
+use crate::seek::Why;
+use crate::set::{MEMORY_GROUNDED, MEMORY_SEEKING, columns, columns_mut};
+use crate::start::From;
 use crate::sweep::Group;
 use crate::velocity::Frames;
 use floorplan::cast_cone;
@@ -40,17 +42,22 @@ impl Localization {
         let (Some(resting), Some(mut loan)) = (self.attitudes.resting(), self.particles.loan()) else {
             return;
         };
-        let level = |angle: f32| if self.grounded { angle.clamp(-LARGEST_LEVEL, LARGEST_LEVEL) } else { 0.0 };
+        let From::Pad(pad) = self.from else {
+            self.seek_from_nothing();
+            return;
+        };
+        let level = self.level_of(&resting);
         let start = &self.config.start;
         let start = mcl::Start {
-            x: self.pad.x,
-            y: self.pad.y,
+            x: pad.x,
+            y: pad.y,
             sigma: start.sigma_m,
-            heading_offset: wrap_angle(self.pad.heading - resting.yaw),
+            heading_offset: wrap_angle(pad.heading - resting.yaw),
             heading_sigma: start.heading_sigma_deg.to_radians(),
-            level_roll: level(resting.roll),
-            level_pitch: level(resting.pitch),
+            level_roll: level[0],
+            level_pitch: level[1],
             level_sigma: start.level_sigma_deg.to_radians(),
+            velocity: [0.0; 2],
             p_lost: if self.grounded { 0.01 } else { HOPELESS },
         };
         let mut generator = Generator::new(self.seed);
@@ -58,8 +65,14 @@ impl Localization {
         self.believed = Some(self.send(now, now, &update, &generator, loan));
     }
 
+    /// The level error (roll, pitch) that an attitude at rest on the ground tells; in the air it tells none.
+    pub(super) fn level_of(&self, resting: &Tilt) -> [f32; 2] {
+        let most = if self.grounded { LARGEST_LEVEL } else { 0.0 };
+        [resting.roll, resting.pitch].map(|angle| angle.clamp(-most, most))
+    }
+
     /// Sends a set that was written for `time_ns`.
-    fn send(
+    pub(super) fn send(
         &mut self,
         now: u64,
         time_ns: u64,
@@ -71,7 +84,8 @@ impl Localization {
         loan.updates = self.sent + 1;
         loan.generator = generator.state();
         loan.memory = update.memory.to_array();
-        loan.memory[MEMORY_GROUNDED] = if self.grounded { 1.0 } else { 0.0 };
+        loan.memory[MEMORY_GROUNDED] = f32::from(u8::from(self.grounded));
+        loan.memory[MEMORY_SEEKING] = f32::from(u8::from(self.seek.why() == Some(Why::Start)));
         loan.count = update.count as u32;
         loan.plan = self.plan;
         loan.send();
@@ -165,6 +179,9 @@ impl Localization {
             }
         }
         self.believed = Some(believed);
+        if let Some(group) = group {
+            self.watch(now, group, &believed);
+        }
     }
 
     /// What is flown by, as the set takes it while the flow sensor sees nothing: what ranges and poor floors show of the
@@ -186,7 +203,7 @@ impl Localization {
     }
 
     /// Whether a flow sensor has seen good floor lately.
-    fn flows_lately(&self, time_ns: u64) -> bool {
+    pub(super) fn flows_lately(&self, time_ns: u64) -> bool {
         self.flow_ns > 0 && seconds(self.flow_ns, time_ns) <= FLOW_KEPT_S
     }
 

@@ -143,6 +143,7 @@ impl Drone {
             sigma: 0.03,
             velocity_sigma: 0.05,
             tracking: true,
+            searching: false,
         }
     }
 

@@ -1,17 +1,20 @@
 //! Scoring a flight by the truth alone: never by what the drone believes (DESIGN 5).
 
 mod coverage;
+mod honesty;
 mod report;
 mod sight;
 #[cfg(test)]
 mod tests;
 
 pub use coverage::{Coverage, ROOM_M, SEEN_M};
+pub use honesty::{Class, EDGES, Honesty, SURE, WRONG_M};
 pub use report::{
     CoverageTotal, ErrorColumn, FlightReport, HeadingColumn, Outcome, Report, Totals, quantile,
 };
 
 use crate::world::World;
+use honesty::Confessor;
 
 /// A landing counts as on the pad within this distance of its centre, metres.
 pub const PAD_RADIUS_M: f32 = 0.35;
@@ -37,6 +40,9 @@ pub struct Observation {
     pub airborne: bool,
     /// The newest published estimate (x, y, heading); `None` before the first.
     pub estimate: Option<(f32, f32, f32)>,
+    /// Probability that it is wrong, as the drone says; `None` before the first and while it searches for its place from
+    /// nothing: then it says that it knows none.
+    pub p_lost: Option<f32>,
 }
 
 /// How a flight ended, by the simulation's truth.
@@ -77,6 +83,7 @@ pub struct Scorer {
     first_fix_s: Option<f64>,
     lost_s: f64,
     last_s: Option<f64>,
+    confessor: Confessor,
 }
 
 /// A scored flight: the report, and the columns that totals are pooled from.
@@ -105,6 +112,7 @@ impl Scorer {
             first_fix_s: None,
             lost_s: 0.0,
             last_s: None,
+            confessor: Confessor::default(),
         }
     }
 
@@ -127,6 +135,9 @@ impl Scorer {
             self.distance += f64::from((seen.x - x).hypot(seen.y - y));
         }
         self.last_place = Some((seen.x, seen.y));
+        if let (Some((metres, _)), Some(p_lost)) = (error, seen.p_lost) {
+            self.confessor.hear(seen.time_s, dt, metres, p_lost);
+        }
         if self.first_fix_s.is_none() {
             return;
         }
@@ -196,6 +207,7 @@ impl Scorer {
             skipped: ending.skipped,
             off_pad_m: report::rounded(off_pad),
             stalled_s: report::rounded(ending.stalled_s),
+            honesty: self.confessor.finish(),
             digest: format!("{:016x}", ending.digest),
         };
         FlightScore { report, errors }

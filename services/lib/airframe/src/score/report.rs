@@ -1,6 +1,6 @@
 //! The figures of flights, with the keys that DESIGN 5 promises.
 
-use super::FlightScore;
+use super::{FlightScore, Honesty};
 use serde::{Deserialize, Serialize};
 
 /// How a flight ended.
@@ -99,6 +99,8 @@ pub struct FlightReport {
     pub off_pad_m: f64,
     /// Seconds that the world stood still for, because the machine stalled: 0 in every rehearsal.
     pub stalled_s: f64,
+    /// P(lost) against the truth.
+    pub honesty: Honesty,
     /// Hash (FNV-1a, 64 bits, hexadecimal) over every truth and every pose of the flight: equal for equal flights.
     pub digest: String,
 }
@@ -113,7 +115,7 @@ pub struct CoverageTotal {
 }
 
 /// All flights.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Totals {
     /// How many.
     pub flights: usize,
@@ -127,6 +129,8 @@ pub struct Totals {
     pub loc_error_m: ErrorColumn,
     /// Smallest clearance of any flight, metres.
     pub min_clearance_m: f64,
+    /// P(lost) against the truth, over all flights.
+    pub honesty: Honesty,
     /// Simulated over wall seconds, summed over flights flown at once: the one figure that may differ
     /// between equal seeds.
     pub real_time_factor: f64,
@@ -151,6 +155,10 @@ impl Report {
         let mut coverage: Vec<f32> = flights.iter().map(|f| f.report.coverage as f32).collect();
         let reports: Vec<FlightReport> = flights.into_iter().map(|f| f.report).collect();
         let share = |column: &mut [f32], q: f64| quantile(column, q).map_or(0.0, rounded);
+        let mut honesty = Honesty::default();
+        for report in &reports {
+            honesty.add(&report.honesty);
+        }
         let nearest = reports.iter().map(|r| r.min_clearance_m).fold(f64::INFINITY, f64::min);
         let total = Totals {
             flights: reports.len(),
@@ -159,6 +167,7 @@ impl Report {
             coverage: CoverageTotal { median: share(&mut coverage, 0.5), p5: share(&mut coverage, 0.05) },
             loc_error_m: ErrorColumn::of(&mut pooled),
             min_clearance_m: if nearest.is_finite() { nearest } else { 0.0 },
+            honesty: honesty.rounded(),
             real_time_factor,
         };
         Self { flights: reports, total, remarks: Vec::new() }

@@ -44,6 +44,7 @@ fn flown(world: &World, error: f32) -> Scorer {
                 yaw: 3.1,
                 airborne: (5.0..25.0).contains(&time_s),
                 estimate: Some((x, 1.5 + off, -3.1)),
+                p_lost: Some(0.001),
             },
         );
     }

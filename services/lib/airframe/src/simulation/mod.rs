@@ -3,6 +3,7 @@
 //! All randomness comes from one seed, in separate streams for what the flight draws, for the motion, for
 //! the sonars and for the flow sensor: asking one sensor more often does not change what another one sees.
 
+mod displacement;
 mod ground;
 mod touch;
 
@@ -16,6 +17,7 @@ use crate::vehicle::{
 };
 use crate::world::draw::stream;
 use crate::world::{ClutterLevel, PadPlace, World, WorldError, WorldFile};
+use displacement::Displacement;
 use floorplan::{Plan, Sidecar};
 use ground::GroundWatch;
 use nalgebra::Vector3;
@@ -31,6 +33,8 @@ const STEP_S: f64 = 1e-3;
 const SLOW_STEPS: u64 = 20;
 /// Free space that a start in a room needs around the airframe's own radius, metres.
 const START_CLEARANCE_M: f32 = 0.4;
+/// What can be flown to from the pad: with this beside the airframe, metres.
+const PASSAGE_M: f32 = 0.1;
 /// Noise of the voltage and share of the current that the board measures wrongly.
 const VOLTS_NOISE: f64 = 0.03;
 const AMPS_NOISE: f64 = 0.03;
@@ -43,6 +47,7 @@ const MOTION: u64 = 102;
 const SONAR: u64 = 103;
 const FLOW: u64 = 104;
 const START: u64 = 105;
+const DISPLACEMENT: u64 = 106;
 
 /// Where the drone stands when the flight begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,6 +76,8 @@ pub struct Options {
     pub charge: f64,
     /// Sonars that never answer: bit = index in the vehicle's list.
     pub dead_sonars: u32,
+    /// Carried off once in flight by so much, metres; 0: never.
+    pub displaced_m: f64,
 }
 
 impl Default for Options {
@@ -83,6 +90,7 @@ impl Default for Options {
             start: StartPlace::default(),
             charge: 1.0,
             dead_sonars: 0,
+            displaced_m: 0.0,
         }
     }
 }
@@ -162,6 +170,7 @@ pub struct Simulation {
     wall_m: f64,
     dead_sonars: u32,
     answers: VecDeque<PingAnswer>,
+    displacement: Option<Displacement>,
 }
 
 impl Simulation {
@@ -180,6 +189,20 @@ impl Simulation {
         Ok(Self::in_world(world, vehicle, options))
     }
 
+    /// Where a flight with these options starts in its world: for whoever has to know it before the flight.
+    #[must_use]
+    pub fn start_place(world: &World, vehicle: &manifest::Vehicle, options: &Options) -> PadPlace {
+        let radius = vehicle.body.radius_m;
+        match options.start {
+            StartPlace::Pad => world.pad(),
+            StartPlace::Room => world.draw_start(
+                radius + PASSAGE_M,
+                radius + START_CLEARANCE_M,
+                &mut stream(options.seed, START),
+            ),
+        }
+    }
+
     /// Puts the drone into a world that stands already.
     #[must_use]
     pub fn in_world(world: World, vehicle: &manifest::Vehicle, options: &Options) -> Self {
@@ -192,13 +215,7 @@ impl Simulation {
         let acoustics = Acoustics::new(&mounts, &mut draws);
         let flow = vehicle.flow.as_ref().map(|s| FlowSensor::draw(FlowSettings::from(s), &mut draws));
 
-        let place = match options.start {
-            StartPlace::Pad => world.pad(),
-            StartPlace::Room => {
-                let clearance = vehicle.body.radius_m + START_CLEARANCE_M;
-                world.draw_start(clearance, &mut stream(options.seed, START))
-            }
-        };
+        let place = Self::start_place(&world, vehicle, options);
         let idle = f64::from(vehicle.motors.idle_fraction);
         let ground = GroundWatch::new(&world, place);
         let touch = Touch::new();
@@ -234,6 +251,7 @@ impl Simulation {
             wall_m: 10.0,
             dead_sonars: options.dead_sonars,
             answers: VecDeque::with_capacity(ECHOES),
+            displacement: Displacement::draw(options.displaced_m, &mut stream(options.seed, DISPLACEMENT)),
         }
     }
 
@@ -256,6 +274,12 @@ impl Simulation {
             self.senses.volts = battery.volts() + VOLTS_NOISE * normal(random);
             self.senses.amps = battery.amps() * (1.0 + AMPS_NOISE * normal(random));
             self.senses.drawn_mah = battery.drawn_mah();
+        }
+        if let Some(displacement) = &mut self.displacement
+            && let Some((x, y)) = displacement.due(&self.world, &self.craft, self.touch.on_ground(), STEP_S)
+        {
+            self.craft.carry_to(x, y);
+            self.displacement = None;
         }
         self.step += 1;
         self.now_ns += STEP_NS;

@@ -127,6 +127,11 @@ impl Quadrotor {
         }
     }
 
+    /// Takes it as it flies to another place, metres: what no sensor of motion feels.
+    pub(crate) fn carry_to(&mut self, x: f64, y: f64) {
+        (self.motion.position.x, self.motion.position.y) = (x, y);
+    }
+
     /// Where it is and how it moves.
     #[must_use]
     pub fn motion(&self) -> &Motion {

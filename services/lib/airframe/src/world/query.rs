@@ -187,13 +187,23 @@ impl World {
             .map_or(f32::MAX, |d| d.min(f32::MAX))
     }
 
-    /// A place on free floor, reachable from the pad at flight height and at least `clearance` metres from
-    /// every solid, with a random heading: where a flight starts that does not start on the pad.
-    pub fn draw_start<R: Rng + ?Sized>(&self, clearance: f32, rng: &mut R) -> super::PadPlace {
+    /// Whether a place is inside the building and nothing stands there at flight height.
+    #[must_use]
+    pub fn is_free_in_flight(&self, x: f32, y: f32) -> bool {
+        let cell = self.ground.cell_at(x, y).map(|(column, row)| row * self.ground.width() + column);
+        cell.is_some_and(|cell| self.ground.is_free_in_flight(cell))
+    }
+
+    /// A place on free floor, at least `clearance` metres from every solid, with a random heading, from which a disc of
+    /// `radius` can fly to the pad: where a flight starts that does not start on the pad.
+    pub fn draw_start<R: Rng + ?Sized>(&self, radius: f32, clearance: f32, rng: &mut R) -> super::PadPlace {
         let ground = &self.ground;
-        let reached = ground.flood(self.pad.x, self.pad.y, |cell| self.flight_distance[cell] > clearance);
-        let places: Vec<usize> =
-            (0..reached.len()).filter(|cell| reached[*cell] && ground.is_free_on_foot(*cell)).collect();
+        let reached = ground.flood(self.pad.x, self.pad.y, |cell| self.flight_distance[cell] > radius);
+        let places: Vec<usize> = (0..reached.len())
+            .filter(|cell| {
+                reached[*cell] && self.flight_distance[*cell] > clearance && ground.is_free_on_foot(*cell)
+            })
+            .collect();
         let heading = uniform(rng, -std::f32::consts::PI, std::f32::consts::PI);
         // Legs of furniture stand lower than flight height: some draws for a place without any.
         for _ in 0..200 {

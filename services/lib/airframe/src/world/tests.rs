@@ -224,7 +224,7 @@ fn bad_pads_and_doors_are_refused_in_words() {
 fn a_start_away_from_the_pad_is_free_and_reachable() {
     let world = build(ClutterLevel::Full, 3);
     for seed in 0..20 {
-        let start = world.draw_start(0.4, &mut draw::stream(seed, 8));
+        let start = world.draw_start(0.3, 0.4, &mut draw::stream(seed, 8));
         assert!(world.still_clearance(start.x, start.y, 0.0, 0.3, 0.35) >= 0.0);
     }
 }

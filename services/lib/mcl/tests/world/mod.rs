@@ -276,6 +276,7 @@ pub(crate) fn fly(world: &World, trial: &Trial) -> Log {
         level_roll: 0.0,
         level_pitch: 0.0,
         level_sigma: 0.015,
+        velocity: [0.0; 2],
         p_lost: 0.01,
     };
     let begun = filter.start_at(&start, old.write(), &mut generator);
