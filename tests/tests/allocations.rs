@@ -41,6 +41,7 @@ fn setup(vehicle: &str) -> Setup {
         root,
         simulator: simulator::Config { clutter: "full".to_owned(), ..simulator::Config::default() },
         navigation: None,
+        begin: cli::flight::Begin::default(),
         patience_s: 120.0,
         cache: runtime::Cache::default(),
     }

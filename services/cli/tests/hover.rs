@@ -14,6 +14,7 @@ fn setup(clutter: &str) -> Setup {
         root,
         simulator: simulator::Config { clutter: clutter.to_owned(), ..simulator::Config::default() },
         navigation: None,
+        begin: cli::flight::Begin::default(),
         patience_s: 120.0,
         cache: runtime::Cache::default(),
     }

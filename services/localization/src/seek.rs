@@ -17,8 +17,10 @@ const LEAST_READINGS: usize = 24;
 const LEAST_AROUND: f32 = 0.7;
 /// Readings that must come between two searches: the same ones give the same answer.
 const FRESH_READINGS: u32 = 24;
-/// Sure is a search that gives one place so much of the belief, and fairly sure one that gives it this much.
+/// Sure is a search that gives one place so much of the belief, and fairly sure one that gives it this much. Where there is a
+/// place that is believed already, another one must be that much more believable still.
 const SURE: f32 = 0.97;
+const SURE_OF_ANOTHER: f32 = 0.999;
 const FAIRLY_SURE: f32 = 0.9;
 /// Found is a place of which a search is sure, when all searches since so much of the way, metres, or so long ago,
 /// seconds, agreed on it and were fairly sure: on the same spot the next search hears the same furniture and the same people.
@@ -45,6 +47,8 @@ pub(crate) enum Why {
     Lost,
     /// A place was found from nothing: is it still the likeliest by what is heard from now on alone?
     Check,
+    /// All seems well: is there a place near by that explains the last metres better?
+    Audit,
 }
 
 /// What a search said: how the trail's frame lies on the plan.
@@ -83,6 +87,12 @@ pub(crate) struct Found {
     pub(crate) doubt: f32,
 }
 
+/// An audit looks this far around, metres, this far to either side of the heading, radians, and every so often, seconds: a
+/// set that slips along a corridor while somebody stands in the way does so by decimetres a minute, and unnoticed.
+const AUDIT_M: f32 = 4.0;
+const AUDIT_TURN_RAD: f32 = 0.25;
+const AUDIT_EVERY_S: f64 = 6.0;
+
 /// The room that the drone is known to be in.
 struct Within {
     rooms: Arc<Rooms>,
@@ -96,8 +106,9 @@ pub(crate) struct Seek {
     why: Option<Why>,
     within: Option<Within>,
     last: Option<Answer>,
-    /// Readings since the last search began.
+    /// Readings since the last search began, and when that was.
     fresh: u32,
+    began_ns: u64,
     /// The frame's heading less the compass, fixed while one search follows the other.
     pub(crate) offset_rad: f32,
 }
@@ -115,6 +126,7 @@ impl Seek {
             within: within.map(|(rooms, room)| Within { rooms, room }),
             last: None,
             fresh: 0,
+            began_ns: 0,
             offset_rad: 0.0,
         }
     }
@@ -148,8 +160,14 @@ impl Seek {
         self.last.map_or(0.0, |answer| answer.share)
     }
 
-    pub(crate) fn hear(&mut self, here: &TrailPose, readings: &[Reading]) {
-        self.trail.push(here, readings);
+    /// Share of the last search that lies farther from a place than one place is wide.
+    pub(crate) fn elsewhere(&self, x: f32, y: f32, here: &TrailPose) -> f32 {
+        let away = self.hypotheses(here).filter(|((hx, hy, _), _)| (hx - x).hypot(hy - y) > NEAR_M);
+        away.map(|(_, share)| share).sum()
+    }
+
+    pub(crate) fn hear(&mut self, time_ns: u64, here: &TrailPose, readings: &[Reading]) {
+        self.trail.push(seconds(0, time_ns), here, readings);
         self.fresh = self.fresh.saturating_add(readings.len() as u32);
     }
 
@@ -168,27 +186,37 @@ impl Seek {
         suspect: Option<(f32, f32, f32)>,
     ) -> (bool, Option<Found>) {
         if !self.search.is_running() {
-            let least = if self.why == Some(Why::Check) { CHECK_READINGS } else { LEAST_READINGS };
+            let least = if matches!(self.why, Some(Why::Check | Why::Audit)) {
+                CHECK_READINGS
+            } else {
+                LEAST_READINGS
+            };
             let enough = self.trail.len() >= least && self.trail.around() >= LEAST_AROUND;
-            if !enough || self.fresh < FRESH_READINGS {
+            let rests = self.why == Some(Why::Audit) && seconds(self.began_ns, now) < AUDIT_EVERY_S;
+            if !enough || rests || self.fresh < FRESH_READINGS {
                 return (false, None);
             }
-            self.fresh = 0;
+            (self.fresh, self.began_ns) = (0, now);
             let turns = match self.why {
                 Some(Why::Lost) => Turns { middle_rad: 0.0, half_rad: LOST_TURN_RAD },
+                Some(Why::Audit) => Turns { middle_rad: 0.0, half_rad: AUDIT_TURN_RAD },
                 _ => Turns::ALL,
             };
             self.search.begin(&self.trail, here, turns, suspect);
         }
         let within = self.within.as_ref().filter(|_| self.why == Some(Why::Start));
-        let allowed = |x: f32, y: f32| within.is_none_or(|w| w.rooms.room_at(x, y) == Some(w.room));
+        let around = suspect.filter(|_| self.why == Some(Why::Audit));
+        let allowed = |x: f32, y: f32| {
+            within.is_none_or(|w| w.rooms.room_at(x, y) == Some(w.room))
+                && around.is_none_or(|(ax, ay, _)| (x - ax).hypot(y - ay) < AUDIT_M)
+        };
         if !self.search.step(table, LOOK_UPS, allowed) {
             return (false, None);
         }
-        (true, self.judge(now, here))
+        (true, self.judge(now, here, suspect))
     }
 
-    fn judge(&mut self, now: u64, here: &TrailPose) -> Option<Found> {
+    fn judge(&mut self, now: u64, here: &TrailPose, suspect: Option<(f32, f32, f32)>) -> Option<Found> {
         let best = *self.search.hypotheses().first()?;
         let near = |other: &&Hypothesis| {
             (other.x - best.x).hypot(other.y - best.y) < NEAR_M
@@ -205,11 +233,15 @@ impl Seek {
             }
         }
         self.last = Some(answer);
-        let agreed = self.why == Some(Why::Check)
-            || way_m - answer.agreed_m >= AGREED_M
-            || seconds(answer.agreed_ns, now) >= AGREED_S;
-        let found = agreed && share >= SURE && best.explained >= EXPLAINED;
-        found.then_some(Found { x, y, turn_rad, doubt: 1.0 - share })
+        let flown = way_m - answer.agreed_m >= AGREED_M;
+        let waited = seconds(answer.agreed_ns, now) >= AGREED_S;
+        let confirms = suspect.is_some_and(|(sx, sy, _)| (x - sx).hypot(y - sy) < NEAR_M);
+        let sure = match self.why {
+            Some(Why::Check | Why::Audit) if confirms => share >= SURE,
+            Some(Why::Check | Why::Audit) => share >= SURE_OF_ANOTHER && flown,
+            _ => share >= SURE && (flown || waited),
+        };
+        (sure && best.explained >= EXPLAINED).then_some(Found { x, y, turn_rad, doubt: 1.0 - share })
     }
 }
 
@@ -269,7 +301,7 @@ mod tests {
             // In its own frame it flies along x and turns to and fro.
             let here = TrailPose { x: 0.02 * step as f32, y: 0.0, heading_rad: (step as f32 * 0.2).sin() };
             truth = (x0 + here.x * turn.cos(), y0 + here.x * turn.sin(), turn);
-            seek.hear(&here, &sweep(&table, truth.0, truth.1, here.heading_rad + turn));
+            seek.hear(1, &here, &sweep(&table, truth.0, truth.1, here.heading_rad + turn));
             for slice in 0..40 {
                 let now = (step * 40 + slice) * 5_000_000;
                 if let (_, Some(found)) = seek.work(&table, now, &here, None) {
@@ -299,7 +331,7 @@ mod tests {
         seek.begin(Why::Start, 0.0);
         let here = TrailPose::default();
         for _ in 0..100 {
-            seek.hear(&here, &sweep(&table, 1.5, 1.2, 0.0)[..2]);
+            seek.hear(1, &here, &sweep(&table, 1.5, 1.2, 0.0)[..2]);
             assert_eq!(seek.work(&table, 1, &here, None), (false, None));
         }
         assert_eq!(seek.share(), 0.0);

@@ -64,6 +64,8 @@ pub struct Localization {
     clutter: Clutter,
     set: Set,
     seek: Seek,
+    /// Share of the last search for another place.
+    elsewhere: f32,
     /// Number and time of the last set sent.
     sent: u64,
     sent_ns: u64,
@@ -133,6 +135,7 @@ impl Service for Localization {
             clutter,
             set: Set::None,
             seek,
+            elsewhere: 0.0,
             sent: 0,
             sent_ns: 0,
             grounded: true,
@@ -330,9 +333,7 @@ impl Localization {
         if let Some(mut pose) = self.poses.loan() {
             fill(&mut pose, now, &b.estimate, &p, b.count, walls);
             pose.adrift_ns = self.adrift_ns;
-            if self.seek.why() == Some(Why::Check) {
-                pose.p_lost = pose.p_lost.max(seeking::UNCHECKED_DOUBT);
-            }
+            pose.p_lost = pose.p_lost.max(self.least_doubt());
             pose.searching = u32::from(self.seek.why() == Some(Why::Start));
             pose.send();
         }

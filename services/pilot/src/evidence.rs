@@ -9,6 +9,8 @@ use ipc_types::{LinkState, Phase};
 const CLEAR_S: f32 = 0.5;
 /// Volts under load jump; a battery that recovered for so long has recovered, seconds.
 const CLEAR_VOLTS_S: f32 = 3.0;
+/// A velocity that is less certain is not known, m/s: a hover drifts through a room in ten seconds.
+const DRIFTS_M_S: f32 = 0.25;
 /// Share of the capacity that is never counted on: the last tenth is where a pack collapses.
 const USABLE: f32 = 0.9;
 /// Mean speed of a way home, as a share of cruise: doors, corners and braking.
@@ -44,7 +46,9 @@ impl PilotCore {
         let uncovered = self.home_uncovered(now);
         let link = age_s(self.flight.at, now) > 1.0 || self.flight.link != LinkState::Up;
         let tilted = self.tilt().magnitude() > policy.tilt_deg.to_radians();
-        let adrift = self.pose.adrift.filter(|_| !place_known);
+        // Who searches has no place to be held by: it is adrift when its velocity is no longer known.
+        let held = searching && self.pose.velocity_sigma < DRIFTS_M_S;
+        let adrift = self.pose.adrift.filter(|_| !place_known && !held);
         // Walls hold a hover that flow does not.
         let few_walls = adrift.is_some() && self.pose.walls < 2;
         let airborne = self.airborne();

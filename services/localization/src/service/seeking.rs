@@ -15,8 +15,8 @@ const FOUND_M: f32 = 0.15;
 const FOUND_RAD: f32 = 0.12;
 const FOUND_DOUBT: f32 = 0.03;
 /// Until it was checked a place that was found is doubted this much at least.
-pub(super) const UNCHECKED_DOUBT: f32 = 0.02;
-/// A check that finds the place this near to where the set has it confirms it, metres.
+const UNCHECKED_DOUBT: f32 = 0.02;
+/// A search that finds the place this near to where the set has it confirms it, metres.
 const FOUND_AGAIN_M: f32 = 0.7;
 /// A hypothesis among others is drawn as wide as the lattice, metres and radians.
 const GUESS_M: f32 = 0.2;
@@ -81,7 +81,7 @@ impl Localization {
         };
         if let Some(group) = group.filter(|_| !self.grounded) {
             let here = self.trail_pose(time_ns);
-            self.seek.hear(&here, group.readings());
+            self.seek.hear(time_ns, &here, group.readings());
         }
         let [x, y] = self.velocity.place_now();
         let [velocity_x, velocity_y] = self.velocity.velocity_now();
@@ -151,6 +151,7 @@ impl Localization {
         start.p_lost = found.doubt.max(FOUND_DOUBT);
         let mut generator = Generator::new(self.seed ^ self.sent);
         // What is heard from now on has had no part in the finding.
+        self.elsewhere = 0.0;
         self.seek.begin(Why::Check, heading_offset);
         let update = self.filter.start_at(&start, crate::set::columns_mut(&mut loan), &mut generator);
         self.believed = Some(self.send(now, time_ns, &update, &generator, loan));
@@ -159,27 +160,44 @@ impl Localization {
     /// Looks for another place while the set doubts itself, or has only just been found.
     pub(super) fn watch(&mut self, now: u64, group: &Group, believed: &Believed) {
         let e = &believed.estimate;
-        if self.grounded || (self.seek.why() == Some(Why::Lost) && e.p_lost < DOUBT_ENDS) {
+        if self.grounded {
             self.seek.stop();
+            self.elsewhere = 0.0;
             return;
         }
-        if self.seek.why().is_none() {
-            if e.p_lost < DOUBT_BEGINS {
-                return;
-            }
-            self.seek.begin(Why::Lost, e.heading_offset);
+        match self.seek.why() {
+            None => self.seek.begin(Why::Audit, 0.0),
+            Some(Why::Audit) if e.p_lost >= DOUBT_BEGINS => self.seek.begin(Why::Lost, e.heading_offset),
+            Some(Why::Lost) if e.p_lost < DOUBT_ENDS => self.seek.begin(Why::Audit, 0.0),
+            Some(_) => {}
         }
-        let here = self.trail_pose(believed.time_ns);
-        self.seek.hear(&here, group.readings());
+        let here = if self.seek.why() == Some(Why::Audit) {
+            // A set that is believed is held by the walls: its own way is truer than the sum of the velocity.
+            self.seek.offset_rad = e.heading_offset;
+            TrailPose { x: e.x, y: e.y, ..self.trail_pose(believed.time_ns) }
+        } else {
+            self.trail_pose(believed.time_ns)
+        };
+        self.seek.hear(believed.time_ns, &here, group.readings());
         let suspect = (e.x, e.y, wrap_angle(e.heading_offset - self.seek.offset_rad));
-        let (_, found) = self.seek.work(&self.table, now, &here, Some(suspect));
+        let (ended, found) = self.seek.work(&self.table, now, &here, Some(suspect));
+        if ended {
+            self.elsewhere = self.seek.elsewhere(e.x, e.y, &here);
+        }
         let Some(found) = found else { return };
         let there = (found.x - e.x).hypot(found.y - e.y) > FOUND_AGAIN_M;
-        if self.seek.why() == Some(Why::Check) && !there {
-            self.seek.stop();
-        } else {
-            self.adopt(now, &found);
+        match self.seek.why() {
+            Some(Why::Check) if !there => self.seek.begin(Why::Audit, 0.0),
+            Some(Why::Audit) if !there => {}
+            _ => self.adopt(now, &found),
         }
+    }
+
+    /// The least that is to be doubted beside what the set doubts itself: a place that was found and is not checked yet,
+    /// and one beside which another explains the last metres better.
+    pub(super) fn least_doubt(&self) -> f32 {
+        let unsure = self.seek.why() == Some(Why::Check) || self.elsewhere > 0.5;
+        if unsure { UNCHECKED_DOUBT } else { 0.0 }
     }
 }
 

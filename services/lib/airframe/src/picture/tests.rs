@@ -20,7 +20,8 @@ fn a_picture_shows_paths_calls_and_escapes_names() {
         let (x, y) = (2.0 + 0.3 * time_s as f32, 3.0 + (time_s as f32 * 0.4).sin());
         world.advance(time_s, (x, y));
         let estimate = (tick % 100 > 10).then_some((x + 0.05, y, 0.0));
-        scorer.observe(&world, &Observation { time_s, x, y, yaw: 0.0, airborne: true, estimate, p_lost: None });
+        scorer
+            .observe(&world, &Observation { time_s, x, y, yaw: 0.0, airborne: true, estimate, p_lost: None });
         let clearance = world.clearance(x, y, 1.1, 0.2, 0.225);
         track.observe(
             &world,

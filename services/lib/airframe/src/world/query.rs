@@ -34,6 +34,9 @@ pub struct Nearest<'a> {
     pub name: &'a str,
 }
 
+/// Nobody stands nearer than this to a drone that is put down somewhere, metres, as nobody does to the pad.
+const ALONE_M: f32 = 1.5;
+
 impl World {
     /// What a ray of unit direction meets first within `reach`.
     #[must_use]
@@ -209,7 +212,11 @@ impl World {
         for _ in 0..200 {
             let Some(cell) = places.get(index(rng, places.len())) else { break };
             let (x, y) = ground.centre(cell % ground.width(), cell / ground.width());
-            if self.still_clearance(x, y, 0.0, 1.5, clearance) >= 0.0 {
+            let alone = self.crowd.people().iter().all(|person| {
+                let (px, py) = person.place();
+                (px - x).hypot(py - y) > ALONE_M
+            });
+            if alone && self.still_clearance(x, y, 0.0, 1.5, clearance) >= 0.0 {
                 return super::PadPlace { x, y, heading };
             }
         }

@@ -13,6 +13,9 @@ const SAME_PLACE_M: f32 = 0.3;
 /// What was heard more than this far back on the way is left out, metres: by then the way itself is off by several
 /// per cent, and the compass with it.
 const LONGEST_WAY_M: f32 = 8.0;
+/// The same for what was heard longer ago than this, seconds: a velocity that errs by two centimetres a second has led
+/// half a metre astray by then, and people have gone on.
+const LONGEST_S: f64 = 25.0;
 
 /// One echo, or silence, with where the sensor was and whither it looked, in the frame of the trail.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,8 +24,9 @@ pub(crate) struct Heard {
     pub(crate) y: f32,
     pub(crate) axis_rad: f32,
     pub(crate) echo: Echo,
-    /// Length of the way when it was heard.
+    /// Length of the way when it was heard, and when that was.
     way_m: f32,
+    time_s: f64,
 }
 
 /// Where the drone is in the frame of the trail: any frame whose place and heading follow the drone without a jump.
@@ -45,7 +49,7 @@ pub struct Trail {
     way_m: f32,
 }
 
-const NONE: Heard = Heard { x: 0.0, y: 0.0, axis_rad: 0.0, echo: Echo::Nothing, way_m: 0.0 };
+const NONE: Heard = Heard { x: 0.0, y: 0.0, axis_rad: 0.0, echo: Echo::Nothing, way_m: 0.0, time_s: 0.0 };
 
 impl Default for Trail {
     fn default() -> Self {
@@ -94,16 +98,16 @@ impl Trail {
         &self.heard[..self.count]
     }
 
-    /// Takes readings that were made at `pose` together. What is not finite is left out.
-    pub fn push(&mut self, pose: &TrailPose, readings: &[Reading]) {
-        if !(pose.x.is_finite() && pose.y.is_finite() && pose.heading_rad.is_finite()) {
+    /// Takes readings that were made at `pose` together, at a time in seconds of any clock. What is not finite is left out.
+    pub fn push(&mut self, time_s: f64, pose: &TrailPose, readings: &[Reading]) {
+        if !(time_s.is_finite() && pose.x.is_finite() && pose.y.is_finite() && pose.heading_rad.is_finite()) {
             return;
         }
         if let Some(last) = self.last {
             self.way_m += (pose.x - last.x).hypot(pose.y - last.y);
         }
         self.last = Some(*pose);
-        self.forget();
+        self.forget(time_s);
         let (sin, cos) = sin_cos(pose.heading_rad);
         for reading in readings {
             let heard = Heard {
@@ -112,6 +116,7 @@ impl Trail {
                 axis_rad: wrap_angle(pose.heading_rad + reading.bearing_rad),
                 echo: reading.echo,
                 way_m: self.way_m,
+                time_s,
             };
             let finite = match heard.echo {
                 Echo::Range(range) => range.is_finite() && range > 0.0,
@@ -143,8 +148,10 @@ impl Trail {
     }
 
     /// Drops what lies too far back.
-    fn forget(&mut self) {
-        let old = self.heard().iter().take_while(|heard| self.way_m - heard.way_m > LONGEST_WAY_M).count();
+    fn forget(&mut self, now_s: f64) {
+        let old =
+            |heard: &&Heard| self.way_m - heard.way_m > LONGEST_WAY_M || now_s - heard.time_s > LONGEST_S;
+        let old = self.heard().iter().take_while(old).count();
         self.heard[..self.count].rotate_left(old);
         self.count -= old;
     }
@@ -175,7 +182,7 @@ mod tests {
         let mut trail = Trail::default();
         let pose = TrailPose { x: 1.0, y: 2.0, heading_rad: 0.5 };
         for turn in 0..10 {
-            trail.push(&pose, &[reading(0.0, 1.0 + turn as f32), reading(90.0, 2.0)]);
+            trail.push(f64::from(turn), &pose, &[reading(0.0, 1.0 + turn as f32), reading(90.0, 2.0)]);
         }
         assert_eq!(trail.len(), 2);
         assert!(trail.heard().iter().any(|heard| heard.echo == Echo::Range(10.0)));
@@ -189,15 +196,17 @@ mod tests {
         let mut trail = Trail::default();
         for k in 0..72 {
             let pose = TrailPose { x: 0.0, y: 0.0, heading_rad: k as f32 * TAU / 72.0 };
-            trail.push(&pose, &[reading(0.0, 1.0)]);
+            trail.push(0.0, &pose, &[reading(0.0, 1.0)]);
         }
         // Two of five degrees each share a direction.
         assert_eq!((trail.len(), trail.around()), (36, 1.0));
         for k in 0..40 {
-            trail.push(&TrailPose { x: 0.4 * k as f32, ..TrailPose::default() }, &[reading(0.0, 1.0)]);
+            trail.push(1.0, &TrailPose { x: 0.4 * k as f32, ..TrailPose::default() }, &[reading(0.0, 1.0)]);
         }
         // Of 15.6 m the last eight, a reading every 0.4 m.
         assert_eq!(trail.len(), 21);
+        trail.push(30.0, &TrailPose { x: 15.6, ..TrailPose::default() }, &[reading(90.0, 1.0)]);
+        assert_eq!(trail.len(), 1, "the rest was heard too long ago");
         trail.clear();
         assert!(trail.is_empty() && trail.around() == 0.0);
     }
@@ -207,17 +216,17 @@ mod tests {
         let mut trail = Trail::default();
         for k in 0..200 {
             let pose = TrailPose { x: 0.0, y: 0.0, heading_rad: 0.0 };
-            trail.push(&pose, &[Reading { mount_x: 0.4 * k as f32, ..reading(0.0, 1.0 + k as f32) }]);
+            trail.push(0.0, &pose, &[Reading { mount_x: 0.4 * k as f32, ..reading(0.0, 1.0 + k as f32) }]);
         }
         assert_eq!(trail.len(), MAX_HEARD);
         assert_eq!(trail.heard()[MAX_HEARD - 1].echo, Echo::Range(200.0));
         assert_eq!(trail.heard()[0].echo, Echo::Range(41.0));
         let count = trail.len();
         for heading_rad in [f32::NAN, f32::INFINITY] {
-            trail.push(&TrailPose { x: 0.0, y: 0.0, heading_rad }, &[reading(40.0, 1.0)]);
+            trail.push(0.0, &TrailPose { x: 0.0, y: 0.0, heading_rad }, &[reading(40.0, 1.0)]);
         }
         let here = TrailPose::default();
-        trail.push(&here, &[reading(f32::NAN, 1.0), reading(50.0, f32::NAN), reading(60.0, -1.0)]);
+        trail.push(0.0, &here, &[reading(f32::NAN, 1.0), reading(50.0, f32::NAN), reading(60.0, -1.0)]);
         assert_eq!(trail.len(), count);
     }
 }
