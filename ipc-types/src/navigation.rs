@@ -50,21 +50,24 @@ codes! {
         Blind = 5 => "no fresh pose or ranges",
         /// Something stands inside the safety distance: backing away.
         BackingOff = 6 => "backing away",
+        /// What the pushes of a potential field leave of its pull.
+        Deflected = 7 => "pushed aside by a potential field",
     }
 }
 
 message! {
-    /// One decision of the Vector Field Histogram.
+    /// One decision of the Vector Field Histogram, or of the method in its place.
     pub struct Polar on "navigation/polar" {
-        /// Polar obstacle density (equation 11). Sector k looks along k * 5 degrees, plan frame.
+        /// Polar obstacle density (equation 11); of a potential field the push away from what stands in the sector, m/s.
+        /// Sector k looks along k * 5 degrees, plan frame.
         pub raw: [f32; 72],
         /// Smoothed density (equations 13, 14).
         pub smoothed: [f32; 72],
         /// 1 where the sector is blocked.
         pub blocked: [u8; 72],
-        /// Threshold above which a free sector becomes blocked.
+        /// Threshold above which a free sector becomes blocked; NaN of a method without thresholds.
         pub threshold_high: f32,
-        /// Threshold below which a blocked sector becomes free.
+        /// Threshold below which a blocked sector becomes free; NaN of a method without thresholds.
         pub threshold_low: f32,
         /// Direction of the target, plan frame; NaN without a target.
         pub target_rad: f32,

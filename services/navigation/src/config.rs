@@ -1,12 +1,72 @@
 //! What an installer may change about navigation.
 
+use avoid::GridRules;
+use core::fmt;
+use core::str::FromStr;
 use runtime::{ConfigError, Validate, within};
 use serde::Deserialize;
+
+/// How obstacles are avoided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Our Vector Field Histogram: cells widened by the airframe, certainty that fades, hysteresis.
+    #[default]
+    Vfh,
+    /// The thesis's Vector Field Histogram with its grid (`docs/thesis-avoidance.md`).
+    Thesis,
+    /// A potential field (`docs/potential-fields.md`).
+    Potential,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Vfh, Self::Thesis, Self::Potential];
+
+    /// As it stands in the configuration and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Vfh => "vfh",
+            Self::Thesis => "thesis",
+            Self::Potential => "potential",
+        }
+    }
+
+    /// How certainty grows and fades: the thesis's grid comes with its histogram.
+    #[must_use]
+    pub fn grid_rules(self) -> GridRules {
+        match self {
+            Self::Vfh | Self::Potential => GridRules::default(),
+            Self::Thesis => GridRules::thesis(),
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Method {
+    type Err = String;
+
+    /// The allowed ones, when it is none of them.
+    fn from_str(word: &str) -> Result<Self, String> {
+        Self::ALL
+            .into_iter()
+            .find(|method| method.name() == word)
+            .ok_or_else(|| Self::ALL.map(Self::name).join(", "))
+    }
+}
 
 /// `config/navigation.toml`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NavigationConfig {
+    /// How obstacles are avoided.
+    pub avoid: Method,
     /// Height of the round above the floor, metres.
     pub height_m: f32,
     /// Speed in free space, metres a second; 0: the vehicle's own cruise.
@@ -45,6 +105,7 @@ pub struct NavigationConfig {
 impl Default for NavigationConfig {
     fn default() -> Self {
         Self {
+            avoid: Method::Vfh,
             height_m: 1.2,
             cruise_m_s: 0.0,
             door_m_s: 0.4,
@@ -110,5 +171,20 @@ mod tests {
         assert!(parse("cruise_m_s = 9.0").contains("0 for the vehicle's"));
         assert!(parse("hight_m = 1.0").contains("hight_m"));
         assert!(parse("wait_s = nan").contains("wait_s"));
+    }
+
+    #[test]
+    fn an_unknown_method_of_avoidance_is_refused_with_the_known_ones() {
+        let said = runtime::parse_config::<NavigationConfig>("n.toml", "avoid = \"magnets\"").unwrap_err();
+        let said = said.to_string();
+        for method in Method::ALL {
+            assert!(said.contains(method.name()), "{said}");
+            let text = format!("avoid = \"{method}\"");
+            let config: NavigationConfig = runtime::parse_config("n.toml", &text).unwrap();
+            assert_eq!(config.avoid, method);
+            assert_eq!(method.name().parse(), Ok(method));
+        }
+        assert!(said.contains("magnets"), "{said}");
+        assert_eq!("VFH".parse::<Method>(), Err("vfh, thesis, potential".to_owned()));
     }
 }

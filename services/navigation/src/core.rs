@@ -60,7 +60,7 @@ impl Core {
     /// Over a building, for a vehicle.
     ///
     /// # Errors
-    /// A vehicle that the histogram cannot be made for.
+    /// A vehicle that the method of avoidance cannot be made for.
     pub fn new(
         config: NavigationConfig,
         craft: Craft,
@@ -68,7 +68,8 @@ impl Core {
     ) -> Result<Self, avoid::ConfigError> {
         Ok(Self {
             senses: Senses::new(craft.radius_m),
-            steering: Steering::new(craft)?,
+            steering: Steering::new(craft, config.avoid)?,
+            rules: config.avoid.grid_rules(),
             mission: Mission::new(atlas.pad()),
             journey: Journey::new(Arc::clone(&atlas), config.tries),
             config,
@@ -77,7 +78,6 @@ impl Core {
             frame_ns: 0,
             explore: Explore::default(),
             beams: Vec::with_capacity(MAX_BEAMS),
-            rules: GridRules::default(),
             walls: WallLayer::new(),
             blockage: Blockage::default(),
             waited_before_s: 0.0,

@@ -2,17 +2,19 @@
 
 mod lane;
 mod line;
+mod method;
 
-use crate::config::NavigationConfig;
+use crate::config::{Method, NavigationConfig};
 use crate::fence::{self, Fence};
 use crate::place::Place;
 use crate::senses::Senses;
 use avoid::swath::free_length;
-use avoid::{Avoider, ConfigError, Decision, Histogram, Reason, Situation, Vfh, VfhConfig, Window, wrap};
+use avoid::{Avoider, ConfigError, Decision, Histogram, Reason, Situation, Vfh, Window, wrap};
 use floorplan::DistanceField;
 use ipc_types::SteeringReason;
 use line::along;
 pub use line::{Aim, clearance_between};
+use method::Chosen;
 
 /// Certainty at which a cell stands in the way: one reading, for 2 s. The next ping of what moves or is passed falls
 /// into another cell; an outlier (FACTS 8: 1 %) is cleared by the next ping through it.
@@ -120,16 +122,16 @@ pub struct Steer {
     pub target: f32,
     /// Free way ahead, metres.
     pub free_m: f32,
-    /// How the histogram decided.
+    /// How the method decided.
     pub decision: Decision,
 }
 
 /// Remembers what makes one decision follow from the last.
 #[derive(Clone, Debug)]
 pub struct Steering {
-    /// With room on each side, and with as little as is allowed.
-    roomy: Vfh,
-    tight: Vfh,
+    /// With room on each side, and, where the method knows it, with as little as is allowed.
+    roomy: Chosen,
+    tight: Option<Vfh>,
     /// The last decision left as little.
     squeezing: bool,
     craft: Craft,
@@ -140,14 +142,15 @@ pub struct Steering {
 }
 
 impl Steering {
-    /// For a vehicle.
+    /// For a vehicle, by a method.
     ///
     /// # Errors
-    /// A vehicle that the histogram cannot be made for.
-    pub fn new(craft: Craft) -> Result<Self, ConfigError> {
+    /// A vehicle that the method cannot be made for.
+    pub fn new(craft: Craft, method: Method) -> Result<Self, ConfigError> {
+        let (roomy, tight) = method::build(method, craft.radius_m)?;
         Ok(Self {
-            roomy: Vfh::new(VfhConfig::flight(craft.radius_m))?,
-            tight: Vfh::new(VfhConfig::tight(craft.radius_m))?,
+            roomy,
+            tight,
             squeezing: false,
             craft,
             heading: f32::NAN,
@@ -166,7 +169,9 @@ impl Steering {
     /// Starts afresh: the next wished heading is the present one, the speed grows from nothing.
     pub fn forget(&mut self) {
         self.roomy.forget();
-        self.tight.forget();
+        if let Some(tight) = &mut self.tight {
+            tight.forget();
+        }
         self.squeezing = false;
         self.heading = f32::NAN;
         self.speed = 0.0;
@@ -208,15 +213,17 @@ impl Steering {
         let mut decision = self.roomy.decide(&situation, histogram);
         // A valley that leads away is left for a narrower one that leads on.
         let off = decision.direction_rad.map_or(f32::INFINITY, |d| wrap(d - target_rad).abs());
-        let squeezing = off > if self.squeezing { LEADS_ON_RAD } else { LEADS_AWAY_RAD };
-        if squeezing {
+        let away = off > if self.squeezing { LEADS_ON_RAD } else { LEADS_AWAY_RAD };
+        let tight = self.tight.as_mut().filter(|_| away);
+        let squeezing = tight.is_some();
+        if let Some(tight) = tight {
             if !self.squeezing {
-                self.tight.forget();
+                tight.forget();
             }
             margin_m = TIGHT_SWATH_M;
             on_line = free(target_rad, margin_m);
             situation.target_m = target_m.min(on_line);
-            decision = self.tight.decide(&situation, histogram);
+            decision = tight.decide(&situation, histogram);
         }
         self.squeezing = squeezing;
         let mut steer = Steer {
@@ -257,7 +264,10 @@ impl Steering {
         };
         steer.free_m = free_m;
         // What is gone round has a side to pass on: it may be nearer than what is waited for.
-        let round = matches!(reason, SteeringReason::NarrowValley | SteeringReason::WideValley);
+        let round = matches!(
+            reason,
+            SteeringReason::NarrowValley | SteeringReason::WideValley | SteeringReason::Deflected
+        );
         let reserve = if round { near } else { reserve };
         let gap = free_m - reserve;
         self.blocked = gap <= wanted || reason == SteeringReason::Blocked;
@@ -360,6 +370,7 @@ fn reason_of(reason: Reason) -> SteeringReason {
         Reason::TargetSafe => SteeringReason::TargetSafe,
         Reason::NarrowValley => SteeringReason::NarrowValley,
         Reason::WideValley => SteeringReason::WideValley,
+        Reason::Deflected => SteeringReason::Deflected,
         Reason::Blocked => SteeringReason::Blocked,
     }
 }

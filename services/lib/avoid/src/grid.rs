@@ -127,10 +127,12 @@ impl Default for GridRules {
 }
 
 impl GridRules {
-    /// Only increments, as in the thesis.
+    /// Only increments, as in the thesis. A byte holds 31 readings, where the thesis's certainty is an integer
+    /// without an end.
     #[must_use]
     pub fn thesis() -> Self {
         Self {
+            most: u8::MAX - u8::MAX % UNITS_PER_READING,
             clear_echo: 0,
             clear_silence: 0,
             decay_per_s: 0.0,

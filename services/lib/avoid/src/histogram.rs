@@ -19,7 +19,7 @@ pub fn sector_of(angle_rad: f32) -> usize {
 /// Direction of a cell from the middle one, radians counter-clockwise from +x (equation 8 with atan2, as its
 /// own footnote asks). Thesis figure 3.6 has the same angles clockwise.
 #[must_use]
-pub(crate) fn bearing(right: i32, up: i32) -> f32 {
+pub fn bearing(right: i32, up: i32) -> f32 {
     (up as f32).atan2(right as f32)
 }
 
@@ -69,7 +69,19 @@ impl Smoothing {
 const WEIGHT_SCALE: f32 = 4096.0;
 
 /// Cells that are looked at together to skip empty ones.
-const WORD: usize = 8;
+pub(crate) const WORD: usize = 8;
+
+/// The more certain of the two layers, many bytes at a time; padded so that it falls into whole words.
+pub(crate) fn more_certain(cells: &[u8], walls: &[u8]) -> [u8; CELLS.next_multiple_of(WORD)] {
+    let mut certain = [0u8; CELLS.next_multiple_of(WORD)];
+    for (out, c) in certain.iter_mut().zip(cells.iter().take(CELLS)) {
+        *out = *c;
+    }
+    for (out, c) in certain.iter_mut().zip(walls.iter().take(CELLS)) {
+        *out = (*out).max(*c);
+    }
+    certain
+}
 
 /// What one cell contributes, worked out once.
 #[derive(Clone, Copy, Debug, Default)]
@@ -126,14 +138,7 @@ impl Table {
         let farthest = if farthest_m.is_nan() { u16::MAX } else { (farthest_m * 1000.0) as u16 };
         // Where the density rises and falls going round twice: enlarged cells may cross from sector 71 to 0.
         let mut change = [0i64; 2 * SECTORS + 1];
-        // The layers' maximum first, many bytes at a time; padded so that it falls into whole words.
-        let mut certain = [0u8; CELLS.next_multiple_of(WORD)];
-        for (out, c) in certain.iter_mut().zip(cells.iter().take(CELLS)) {
-            *out = *c;
-        }
-        for (out, c) in certain.iter_mut().zip(walls.iter().take(CELLS)) {
-            *out = (*out).max(*c);
-        }
+        let certain = more_certain(cells, walls);
         for (word, eight) in certain.as_chunks::<WORD>().0.iter().enumerate() {
             if u64::from_ne_bytes(*eight) == 0 {
                 continue;

@@ -9,7 +9,9 @@
 //! 2. [`walls`]: the same raster holding what the floor plan knows, so that sonars need not discover walls.
 //! 3. [`vfh`]: the polar histogram and the choice of a direction and a speed, behind the trait [`Avoider`],
 //!    so that other methods are compared with it on the same inputs.
-//! 4. [`swath`]: how far a straight strip ahead is free of what the sonars have seen.
+//! 4. [`potential`]: the method that the thesis weighs first and puts aside, artificial potential fields, behind the
+//!    same trait.
+//! 5. [`swath`]: how far a straight strip ahead is free of what the sonars have seen.
 //!
 //! Angles are counter-clockwise from the plan's +x, as everywhere in this house; the thesis counts clockwise
 //! (figure 3.6), so its numbers appear here with the other sign.
@@ -18,16 +20,20 @@
 //! allocates after construction, and no byte pattern or float makes one panic.
 #![forbid(unsafe_code)]
 
+mod error;
 pub mod grid;
 mod histogram;
+pub mod potential;
 pub mod swath;
 mod valley;
 pub mod vfh;
 pub mod walls;
 
+pub use error::ConfigError;
 pub use grid::{Beam, CELL_M, CELLS, Echo, GridRules, SIDE, Window};
-pub use histogram::{SECTOR_RAD, SECTORS, Smoothing, sector_of};
-pub use vfh::{ConfigError, ROOMY_M, TIGHT_M, Vfh, VfhConfig};
+pub use histogram::{SECTOR_RAD, SECTORS, Smoothing, bearing, sector_of};
+pub use potential::{PotentialConfig, PotentialField};
+pub use vfh::{ROOMY_M, TIGHT_M, Vfh, VfhConfig};
 pub use walls::WallLayer;
 
 /// What an avoider is asked.
@@ -49,7 +55,7 @@ pub struct Situation<'a> {
 /// Where an avoider writes how it came to its decision, one entry a sector.
 #[derive(Debug)]
 pub struct Histogram<'a> {
-    /// Polar obstacle density (equation 11).
+    /// Polar obstacle density (equation 11); of a potential field the push away from what stands in the sector, m/s.
     pub raw: &'a mut [f32; SECTORS],
     /// Smoothed density.
     pub smoothed: &'a mut [f32; SECTORS],
@@ -68,7 +74,9 @@ pub enum Reason {
     NarrowValley,
     /// Along the near border of a wide valley (equation 15).
     WideValley,
-    /// No valley leads on.
+    /// What a potential field's pushes leave of its pull.
+    Deflected,
+    /// No valley leads on, or a potential field pushes as much as it pulls.
     Blocked,
 }
 
@@ -83,9 +91,9 @@ pub struct Decision {
     pub reason: Reason,
     /// First and last sector of the chosen valley, inclusive, counting upwards and wrapping.
     pub valley: Option<(u8, u8)>,
-    /// Density above which a free sector becomes blocked.
+    /// Density above which a free sector becomes blocked; NaN of a method without thresholds.
     pub threshold_high: f32,
-    /// Density below which a blocked sector becomes free.
+    /// Density below which a blocked sector becomes free; NaN of a method without thresholds.
     pub threshold_low: f32,
 }
 

@@ -1,23 +1,12 @@
 //! The Vector Field Histogram's output layer: direction and speed.
 
-use crate::grid::{CELL_M, HALF};
+use crate::grid::{CELL_M, SIDE};
 use crate::histogram::{SECTOR_RAD, SECTORS, Smoothing, Table, sector_of};
 use crate::valley::{self, Border, Valley};
-use crate::{Avoider, Decision, Histogram, Reason, Situation, wrap};
-use thiserror::Error;
+use crate::{Avoider, ConfigError, Decision, Histogram, Reason, Situation, wrap};
 
-/// A parameter that makes no sense.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error("vfh: {field} is {value}, allowed is {allowed}")]
-pub struct ConfigError {
-    /// Field of [`VfhConfig`].
-    pub field: &'static str,
-    /// What it held.
-    pub value: f32,
-    /// What it may hold.
-    pub allowed: &'static str,
-}
-
+/// As it is called in reports.
+const NAME: &str = "vfh";
 /// Cells are widened by the airframe and this, metres, where there is room: gusts and an error of the velocity carry
 /// the drone 0.1 m off its way before it is flown back, and the raster eats five centimetres.
 pub const ROOMY_M: f32 = 0.18;
@@ -50,6 +39,8 @@ pub struct VfhConfig {
     pub continuity: usize,
     /// A valley farther than this from the target's direction leads away: blocked.
     pub max_detour_rad: f32,
+    /// What stands farther away than the target does not count. Off: every cell of the window counts (thesis).
+    pub to_target_only: bool,
 }
 
 impl VfhConfig {
@@ -73,6 +64,7 @@ impl VfhConfig {
             straight_at_target: true,
             continuity: 4,
             max_detour_rad: 75.0_f32.to_radians(),
+            to_target_only: true,
         }
     }
 
@@ -82,12 +74,17 @@ impl VfhConfig {
         Self { clearance_m: radius_m + TIGHT_M, ..Self::flight(radius_m) }
     }
 
-    /// The thesis author's constants (FACTS 7): a point, a = 5, b = a / window, threshold 2, s_max 15, hm 8.
+    /// The thesis's text with its author's constants (FACTS 7), each deviation in `docs/thesis-avoidance.md`.
+    ///
+    /// A point, because the text widens no cell. `a` 5 and b = a / window, with the window of 81 cells of the text:
+    /// b is 5/81 a cell, and a - b d is 1.5 in the window's farthest corner, never negative. (The author's code has
+    /// 141 cells.) Threshold 2 without hysteresis, `s_max` 15, hm 8, no memory of the side flown last, and no valley
+    /// too far from the target: the nearest one is flown, wherever it leads.
     #[must_use]
     pub fn thesis() -> Self {
         Self {
             a: 5.0,
-            reach_m: (2 * HALF + 1) as f32 * CELL_M,
+            reach_m: SIDE as f32 * CELL_M,
             clearance_m: 0.0,
             smoothing: Smoothing::Hann,
             threshold_high: 2.0,
@@ -96,13 +93,18 @@ impl VfhConfig {
             slow_density: 8.0,
             straight_at_target: true,
             continuity: 0,
-            max_detour_rad: core::f32::consts::PI,
+            max_detour_rad: core::f32::consts::TAU,
+            to_target_only: false,
         }
     }
 
     fn validate(&self) -> Result<(), ConfigError> {
         let check = |field, value: f32, good: bool, allowed| {
-            if value.is_finite() && good { Ok(()) } else { Err(ConfigError { field, value, allowed }) }
+            if value.is_finite() && good {
+                Ok(())
+            } else {
+                Err(ConfigError { method: NAME, field, value, allowed })
+            }
         };
         check("a", self.a, self.a > 0.0 && self.a <= 100.0, "0..=100, not 0")?;
         check("reach_m", self.reach_m, (0.2..=20.0).contains(&self.reach_m), "0.2..=20 m")?;
@@ -201,7 +203,7 @@ impl Vfh {
 
 impl Avoider for Vfh {
     fn name(&self) -> &'static str {
-        "vfh"
+        NAME
     }
 
     fn decide(&mut self, situation: &Situation<'_>, histogram: &mut Histogram<'_>) -> Decision {
@@ -210,7 +212,8 @@ impl Avoider for Vfh {
         let (high, low) = (config.threshold_high * gain, config.threshold_low * gain);
         // The target hides what is behind it: only what the vehicle would touch on the way there counts.
         let farthest = situation.target_m.max(0.0) + config.clearance_m;
-        let farthest = if situation.target_m.is_finite() { farthest } else { f32::NAN };
+        let limited = config.to_target_only && situation.target_m.is_finite();
+        let farthest = if limited { farthest } else { f32::NAN };
         self.table.density(situation.cells, situation.walls, farthest, histogram.raw);
         config.smoothing.apply(histogram.raw, histogram.smoothed);
         for (blocked, h) in self.blocked.iter_mut().zip(histogram.smoothed.iter()) {

@@ -13,7 +13,7 @@ use avoid::grid::{insert, scroll};
 use avoid::{CELLS, GridRules, Histogram, SECTORS, WallLayer, Window, wrap};
 use floorplan::{Cell, DistanceField, Plan};
 use ipc_types::{SonarReading, SonarStatus, SteeringReason};
-use navigation::config::NavigationConfig;
+use navigation::config::{Method, NavigationConfig};
 use navigation::place::Place;
 use navigation::senses::Senses;
 use navigation::steer::{Craft, Scene, Steer, Steering};
@@ -176,16 +176,20 @@ pub struct Bench {
 
 impl Bench {
     pub fn new() -> Self {
+        Self::by(Method::Vfh)
+    }
+
+    pub fn by(method: Method) -> Self {
         Self {
-            config: NavigationConfig::default(),
-            steering: Steering::new(Craft { radius_m: RADIUS_M, cruise_m_s: 0.5 }).unwrap(),
+            config: NavigationConfig { avoid: method, ..NavigationConfig::default() },
+            steering: Steering::new(Craft { radius_m: RADIUS_M, cruise_m_s: 0.5 }, method).unwrap(),
             senses: Senses::default(),
             track: Track::new(),
             walls: WallLayer::new(),
             cells: vec![0; CELLS],
             next: vec![0; CELLS],
             window: None,
-            rules: GridRules::default(),
+            rules: method.grid_rules(),
         }
     }
 
@@ -231,7 +235,11 @@ pub struct Flown {
 }
 
 pub fn follow(world: &World, line: &[(f32, f32)], seconds: f32) -> Flown {
-    let mut bench = Bench::new();
+    follow_by(Method::Vfh, world, line, seconds)
+}
+
+pub fn follow_by(method: Method, world: &World, line: &[(f32, f32)], seconds: f32) -> Flown {
+    let mut bench = Bench::by(method);
     bench.track.set(line.iter().copied());
     let mut drone = Drone::at(line[0]);
     let mut flown = Flown {
