@@ -1,10 +1,11 @@
 //! The command line.
 
 use crate::operate::Order;
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli::flight::Begin;
 use cli::place::Place;
+use navigation::config::Method;
 use std::path::PathBuf;
 
 /// Sereno: a night watchman for the inside of a building.
@@ -173,9 +174,9 @@ pub(crate) struct Rehearse {
     /// Seed of the first flight; flight k is drawn from this and k alone.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// How obstacles are avoided: vfh.
-    #[arg(long, default_value = AVOID)]
-    pub avoid: String,
+    /// How obstacles are avoided: vfh, thesis or potential; what navigation's configuration says when absent.
+    #[arg(long, value_name = "METHOD")]
+    pub avoid: Option<String>,
     /// Where the drone stands at first, and what localization is told of it.
     #[arg(long, value_enum, default_value_t)]
     pub start: StartWord,
@@ -232,19 +233,24 @@ fn pad(text: &str) -> Result<[f32; 3], String> {
 
 /// Farthest coordinate of a pad, as in a plan's side file.
 const PAD_M: f32 = 10_000.0;
-/// The one way of avoiding obstacles that navigation has.
-const AVOID: &str = "vfh";
 /// More flights at once than any machine has cores for.
 const MOST_THREADS: usize = 256;
 /// More than a month of rehearsals.
 const MOST_FLIGHTS: u64 = 100_000;
 
 impl Rehearse {
+    /// How obstacles are avoided, if it is said.
+    pub(crate) fn method(&self) -> Result<Option<Method>> {
+        let word = self.avoid.as_deref();
+        word.map(|word| {
+            word.parse().map_err(|known| anyhow!("--avoid {word} is not possible: possible is {known}"))
+        })
+        .transpose()
+    }
+
     /// Refuses what cannot be flown, in one sentence.
     pub(crate) fn check(&self, json: bool) -> Result<()> {
-        if self.avoid != AVOID {
-            bail!("--avoid {} is not possible: nothing implements it yet; possible is {AVOID}", self.avoid);
-        }
+        self.method()?;
         if !(1..=MOST_FLIGHTS).contains(&self.flights) {
             bail!("--flights {} is out of range: allowed is 1..={MOST_FLIGHTS}", self.flights);
         }
@@ -333,6 +339,17 @@ mod tests {
     }
 
     #[test]
+    fn every_method_of_avoidance_can_be_asked_for() {
+        for method in Method::ALL {
+            let line = CONTRACT.replace("--avoid vfh", &format!("--avoid {method}"));
+            let (rehearse, json) = rehearsal(&line);
+            rehearse.check(json).unwrap();
+            assert_eq!(rehearse.method().unwrap(), Some(method));
+        }
+        assert_eq!(rehearsal("sereno rehearse").0.method().unwrap(), None, "the configuration says");
+    }
+
+    #[test]
     fn a_pad_is_three_numbers() {
         let (rehearse, _) = rehearsal("sereno rehearse --pad -9.5,2,90 --flights 1");
         assert_eq!(rehearse.pad, Some([-9.5, 2.0, 90.0]));
@@ -344,7 +361,8 @@ mod tests {
 
     #[test]
     fn what_nothing_implements_is_refused_with_what_is_possible() {
-        assert!(refusal("--avoid vfh", "--avoid potential").contains("possible is vfh"));
+        let said = refusal("--avoid vfh", "--avoid magnets");
+        assert!(said.contains("magnets") && said.contains("possible is vfh, thesis, potential"), "{said}");
         let roof = CONTRACT.replace("--start pad", "--start roof");
         let said = Arguments::try_parse_from(roof.split_whitespace()).unwrap_err().to_string();
         assert!(said.contains("roof") && said.contains("pad, room, unknown"), "{said}");

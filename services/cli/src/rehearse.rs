@@ -7,7 +7,7 @@ use cli::building::Building;
 use cli::flight::{Flight, Setup};
 use cli::place::{Place, vehicle_file};
 use indicatif::{ProgressBar, ProgressStyle};
-use navigation::config::NavigationConfig;
+use navigation::config::{Method, NavigationConfig};
 use runtime::{Cache, Start};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -40,33 +40,32 @@ fn setup(place: &Place, order: &Rehearse) -> Result<(Setup, Vec<String>)> {
     order.clutter.clone_into(&mut simulator.clutter);
     simulator.displaced_m = order.displaced;
     runtime::Validate::validate(&simulator)?;
-    let mut navigation = None;
+    if let Some(speed) = order.speed
+        && !(0.1..=1.5).contains(&speed)
+    {
+        bail!("--speed {speed} is out of range: allowed is 0.1..=1.5 m/s");
+    }
+    let entry = manifest.services.get("navigation").context("the manifest has no navigation")?;
+    let text = std::fs::read_to_string(root.join(&entry.config)).with_context(|| entry.config.clone())?;
+    let mut navigation: NavigationConfig = runtime::parse_config(&entry.config, &text)?;
     if let Some(speed) = order.speed {
-        if !(0.1..=1.5).contains(&speed) {
-            bail!("--speed {speed} is out of range: allowed is 0.1..=1.5 m/s");
-        }
-        let entry = manifest.services.get("navigation").context("the manifest has no navigation")?;
-        let text = std::fs::read_to_string(root.join(&entry.config)).with_context(|| entry.config.clone())?;
-        let mut config: NavigationConfig = runtime::parse_config(&entry.config, &text)?;
-        config.cruise_m_s = speed as f32;
-        navigation = Some(config);
+        navigation.cruise_m_s = speed as f32;
+    }
+    let method = order.method()?;
+    if let Some(method) = method {
+        navigation.avoid = method;
     }
     let cache = Cache::default();
     let start = Start::new(manifest.system.clone(), &root, 0, 0, true, cache.clone())?;
-    let Building { pad, remarks } = Building::survey(&start, order.pad)?;
+    let Building { pad, mut remarks } = Building::survey(&start, order.pad)?;
+    if navigation.avoid != Method::default() {
+        remarks.push(format!("obstacles are avoided by the method \"{}\"", navigation.avoid));
+    }
     manifest.system.pad = Some([pad.x, pad.y, pad.heading_deg]);
-    Ok((
-        Setup {
-            manifest,
-            root,
-            simulator,
-            navigation,
-            begin: order.start.into(),
-            patience_s: PATIENCE_S,
-            cache,
-        },
-        remarks,
-    ))
+    // The manifest's own file otherwise, with its hash in the journal.
+    let navigation = (order.speed.is_some() || method.is_some()).then_some(navigation);
+    let begin = order.start.into();
+    Ok((Setup { manifest, root, simulator, navigation, begin, patience_s: PATIENCE_S, cache }, remarks))
 }
 
 /// A scored flight and how much simulated time it took.
