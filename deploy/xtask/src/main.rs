@@ -1,4 +1,4 @@
-//! Build tasks: `cargo xtask demo` and `cargo xtask test`.
+//! Build tasks: `cargo xtask demo`, `cargo xtask test` and `cargo xtask figures`.
 #![allow(clippy::print_stdout, reason = "build tasks say what they do")]
 
 use anyhow::{Context, Result, bail};
@@ -33,6 +33,8 @@ enum Task {
     },
     /// Run every test.
     Test,
+    /// Draw the thesis's figures of chapter 3.1 again, into `docs/figures`.
+    Figures,
 }
 
 fn main() -> ExitCode {
@@ -40,6 +42,7 @@ fn main() -> ExitCode {
     let done = match arguments.task {
         Task::Demo { once, seed, picture, kills } => demo(once, seed, &picture, kills),
         Task::Test => test(),
+        Task::Figures => figures(),
     };
     match done {
         Ok(code) => code,
@@ -105,5 +108,11 @@ fn test() -> Result<ExitCode> {
     // The system tests run the services as they are flown.
     build_programs(&root)?;
     cargo(&root, &["test", "--workspace", "--no-fail-fast"])?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn figures() -> Result<ExitCode> {
+    let root = checkout()?;
+    cargo(&root, &["run", "--quiet", "--package", "avoid", "--example", "figures", "--", "docs/figures"])?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,10 +1,12 @@
-//! One avoidance step: scroll, eight beams, walls, histogram, decision (target: 20 us); and the same where the first
-//! decision finds no way and a second one is made with less room, as navigation does.
+//! One avoidance step: scroll, eight beams, walls, histogram, decision (target: 20 us); the same where the first decision
+//! finds no way and a second one is made with less room, as navigation does; and side by side the decisions alone of our
+//! histogram, the thesis's and the potential field, on the same grid.
 #![allow(clippy::unwrap_used, missing_docs, reason = "bench")]
 
 use avoid::grid::{Faded, insert, scroll};
 use avoid::{
-    Avoider, Beam, CELLS, Echo, GridRules, Histogram, SECTORS, Situation, Vfh, VfhConfig, WallLayer, Window,
+    Avoider, Beam, CELLS, Echo, GridRules, Histogram, PotentialConfig, PotentialField, SECTORS, Situation,
+    Smoothing, Vfh, VfhConfig, WallLayer, Window,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::f32::consts::TAU;
@@ -63,5 +65,46 @@ fn step_of(c: &mut Criterion, squeezing: bool) {
     });
 }
 
-criterion_group!(benches, step);
+/// In the corridor, with as many certain cells as a wall layer has there, and in the open with a thing in sight.
+fn decisions(c: &mut Criterion) {
+    let window = Window::around(0.0, 0.0).unwrap();
+    let mut walls = WallLayer::new();
+    walls.follow(&window, solid);
+    let mut cells = vec![0u8; CELLS];
+    for k in 0..8 {
+        let echo = Echo::Obstacle(0.9 + 0.1 * k as f32);
+        let beam = Beam { x_m: 0.0, y_m: 0.0, angle_rad: k as f32 * TAU / 8.0, echo };
+        insert(&mut cells, &window, &GridRules::default(), &beam);
+    }
+    let vfh = |config| Vfh::new(config).unwrap();
+    let thesis_13 = VfhConfig { smoothing: Smoothing::Triangle, ..VfhConfig::thesis() };
+    let mut methods: [(&str, Box<dyn Avoider>); 4] = [
+        ("ours", Box::new(vfh(VfhConfig::flight(0.225)))),
+        ("thesis", Box::new(vfh(VfhConfig::thesis()))),
+        ("thesis_equation_13", Box::new(vfh(thesis_13))),
+        ("potential", Box::new(PotentialField::new(PotentialConfig::flight(0.225)).unwrap())),
+    ];
+    for (place, walls) in [("corridor", walls.cells()), ("open", &[][..])] {
+        let mut group = c.benchmark_group(format!("decision_81x81_{place}"));
+        for (name, avoider) in &mut methods {
+            let (mut raw, mut smoothed, mut blocked) = ([0.0; SECTORS], [0.0; SECTORS], [0; SECTORS]);
+            group.bench_function(*name, |b| {
+                b.iter(|| {
+                    let situation = Situation {
+                        cells: black_box(&cells),
+                        walls: black_box(walls),
+                        target_rad: 0.1,
+                        target_m: 1.2,
+                        max_speed_m_s: 0.5,
+                    };
+                    let mut histogram =
+                        Histogram { raw: &mut raw, smoothed: &mut smoothed, blocked: &mut blocked };
+                    avoider.decide(&situation, &mut histogram)
+                });
+            });
+        }
+    }
+}
+
+criterion_group!(benches, step, decisions);
 criterion_main!(benches);

@@ -74,8 +74,12 @@ pub(crate) fn from_border(valley: Valley, near: Border, s_max: usize) -> (f32, b
 }
 
 /// Equation 15 for a target in a free sector, which then is k_n itself: k_f lies `s_max` sectors on, or at the
-/// border, towards the larger part of the valley. This is what circles in figure 3.9.
+/// border, towards the larger part of the valley, and always to the same side where nothing is blocked. This is what
+/// circles in figure 3.9.
 pub(crate) fn from_inside(valley: Valley, target: usize, s_max: usize) -> (f32, bool) {
+    if valley.width >= SECTORS {
+        return ((target as f32 + 0.5 * s_max as f32) % SECTORS as f32, true);
+    }
     let near = (target + SECTORS - valley.first) % SECTORS;
     let upwards = 2 * near < valley.width;
     let room = if upwards { valley.width - 1 - near } else { near };
@@ -133,6 +137,16 @@ mod tests {
             assert_eq!(from_border(Valley { first: 10, width: 7 }, near, 8), (13.0, false));
             assert_eq!(from_border(Valley { first: 69, width: 6 }, near, 8), (71.5, false));
             assert_eq!(from_border(Valley { first: 70, width: 5 }, near, 8), (0.0, false));
+        }
+    }
+
+    #[test]
+    fn with_nothing_blocked_the_course_keeps_to_one_side_of_the_target() {
+        let around = Valley { first: 0, width: SECTORS };
+        for target in [0, 1, 35, 36, 37, 71] {
+            let (middle, wide) = from_inside(around, target, 15);
+            assert_eq!(middle, (target as f32 + 7.5) % SECTORS as f32);
+            assert!(wide);
         }
     }
 

@@ -1,212 +1,116 @@
-//! The situations of thesis figures 3.8 to 3.12, in small: exact rays into an ASCII world, a drone that flies
-//! exactly as told. Up on the page is +y; angles are counter-clockwise (the thesis counts clockwise).
-#![allow(clippy::unwrap_used, reason = "tests")]
+//! Thesis figures 3.8 to 3.12: the flights that the committed pictures show, and what must be true of them. Up on the page
+//! is +y; angles are counter-clockwise (the thesis counts clockwise).
+#![allow(clippy::unwrap_used, unreachable_pub, dead_code, reason = "tests, sharing code with an example")]
 
-use avoid::grid::{Faded, insert, scroll};
-use avoid::{
-    Avoider, Beam, CELLS, Decision, Echo, GridRules, Histogram, Reason, SECTORS, Situation, Vfh, VfhConfig,
-};
-use avoid::{Window, wrap};
-use std::f32::consts::TAU;
+#[path = "../examples/figures/scenes.rs"]
+mod scenes;
+#[path = "../examples/figures/world.rs"]
+mod world;
 
-/// Side of a character of the map, metres.
-const TILE: f32 = 0.2;
-
-struct World {
-    rows: Vec<Vec<u8>>,
-}
-
-impl World {
-    fn new(rows: &[&str]) -> Self {
-        Self { rows: rows.iter().rev().map(|r| r.bytes().collect()).collect() }
-    }
-    fn solid(&self, x: f32, y: f32) -> bool {
-        if x < 0.0 || y < 0.0 {
-            return false;
-        }
-        self.rows.get((y / TILE) as usize).and_then(|r| r.get((x / TILE) as usize)) == Some(&b'#')
-    }
-    fn find(&self, mark: u8) -> (f32, f32) {
-        for (iy, row) in self.rows.iter().enumerate() {
-            if let Some(ix) = row.iter().position(|c| *c == mark) {
-                return ((ix as f32 + 0.5) * TILE, (iy as f32 + 0.5) * TILE);
-            }
-        }
-        unreachable!("mark not on the map")
-    }
-    fn cast(&self, x: f32, y: f32, angle: f32, reach: f32) -> Option<f32> {
-        (1..(reach / 0.01) as usize)
-            .map(|i| i as f32 * 0.01)
-            .find(|r| self.solid(x + r * angle.cos(), y + r * angle.sin()))
-    }
-    fn distance(&self, x: f32, y: f32) -> f32 {
-        (0..72).filter_map(|k| self.cast(x, y, k as f32 * TAU / 72.0, 3.0)).fold(3.0, f32::min)
-    }
-}
-
-struct Flight {
-    path: Vec<(f32, f32)>,
-    reasons: Vec<Reason>,
-    nearest: f32,
-    arrived: bool,
-}
+use avoid::{CELLS, Decision, Reason, SECTORS, Smoothing, Vfh, VfhConfig, Window, wrap};
+use scenes::RADIUS_M;
+use world::{Trial, fly};
 
 fn decide(vfh: &mut Vfh, cells: &[u8], target_rad: f32, target_m: f32) -> (Decision, [u8; SECTORS]) {
-    let (mut raw, mut smoothed, mut blocked) = ([0.0; SECTORS], [0.0; SECTORS], [0; SECTORS]);
-    let decision = vfh.decide(
-        &Situation { cells, walls: &[], target_rad, target_m, max_speed_m_s: 0.5 },
-        &mut Histogram { raw: &mut raw, smoothed: &mut smoothed, blocked: &mut blocked },
-    );
-    (decision, blocked)
-}
-
-/// Sixteen rays every 50 ms, from S to T, for at most `seconds`.
-fn fly(world: &World, config: VfhConfig, seconds: f32) -> Flight {
-    let mut vfh = Vfh::new(config).unwrap();
-    let rules = GridRules::default();
-    let (mut x, mut y) = world.find(b'S');
-    let (tx, ty) = world.find(b'T');
-    let mut window = Window::around(x, y).unwrap();
-    let mut cells = vec![0u8; CELLS];
-    let mut next = vec![0u8; CELLS];
-    let mut flight = Flight { path: vec![(x, y)], reasons: Vec::new(), nearest: f32::MAX, arrived: false };
-    for _ in 0..(seconds / 0.05) as usize {
-        let to = Window::around(x, y).unwrap();
-        scroll(&cells, &window, &mut next, &to, Faded::default());
-        std::mem::swap(&mut cells, &mut next);
-        window = to;
-        for ray in 0..16 {
-            let angle_rad = ray as f32 * TAU / 16.0;
-            let echo = world.cast(x, y, angle_rad, 4.0).map_or(Echo::Silence(4.0), Echo::Obstacle);
-            insert(&mut cells, &window, &rules, &Beam { x_m: x, y_m: y, angle_rad, echo });
-        }
-        let (dx, dy) = (tx - x, ty - y);
-        let (decision, _) = decide(&mut vfh, &cells, dy.atan2(dx), dx.hypot(dy));
-        flight.reasons.push(decision.reason);
-        if let Some(direction) = decision.direction_rad {
-            x += 0.05 * decision.speed_m_s * direction.cos();
-            y += 0.05 * decision.speed_m_s * direction.sin();
-        }
-        flight.path.push((x, y));
-        flight.nearest = flight.nearest.min(world.distance(x, y));
-        if (tx - x).hypot(ty - y) < 0.1 {
-            flight.arrived = true;
-            break;
-        }
-    }
-    flight
-}
-
-fn length(path: &[(f32, f32)]) -> f32 {
-    path.windows(2).map(|p| (p[1].0 - p[0].0).hypot(p[1].1 - p[0].1)).sum()
+    let look = world::look(vfh, cells, target_rad, target_m, 0.5);
+    (look.decision, look.blocked)
 }
 
 #[test]
 fn figure_3_8_a_wide_valley_beside_an_obstacle_is_flown_along_its_near_border() {
-    let world = World::new(&[
-        "                     ",
-        "                     ",
-        "                     ",
-        "         ##          ",
-        "         ##          ",
-        "S        ##         T",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-    ]);
-    let flight = fly(&world, VfhConfig::tight(0.225), 60.0);
-    assert!(flight.arrived, "{:?}", flight.path.last());
-    assert!(flight.reasons.contains(&Reason::WideValley));
-    assert!(flight.nearest > 0.225, "{}", flight.nearest);
+    let world = scenes::wide_valley();
+    let ours = scenes::wide_valley_ours();
+    assert!(ours.arrived, "{:?}", ours.path.last());
+    assert!(ours.has(Reason::WideValley));
+    assert!(ours.nearest > RADIUS_M, "{}", ours.nearest);
     // Round the upper, nearer end: never below the start.
-    let lowest = flight.path.iter().map(|p| p.1).fold(f32::MAX, f32::min);
+    let lowest = ours.path.iter().map(|p| p.1).fold(f32::MAX, f32::min);
     assert!(lowest > world.find(b'S').1 - 0.3, "{lowest}");
+    // The thesis's vehicle is a point, and flies as one.
+    let thesis = scenes::wide_valley_thesis();
+    assert!(thesis.arrived && thesis.has(Reason::WideValley));
+    assert!(thesis.nearest > 0.0 && thesis.nearest < RADIUS_M, "{}", thesis.nearest);
+}
+
+#[test]
+fn at_three_sweeps_a_second_the_smoothing_of_equation_14_leaves_gaps_that_equation_13_closes() {
+    // Readings are 22.5 degrees apart less the swing of the heading. Equation 14 reaches one sector to either side, 13 five.
+    let hann = fly(&scenes::wide_valley(), &mut scenes::vfh(VfhConfig::thesis()), &Trial::thesis());
+    let triangle = fly(&scenes::wide_valley(), &mut scenes::vfh(scenes::thesis_13()), &Trial::thesis());
+    assert!(hann.hit, "{:?}", hann.end());
+    assert!(triangle.arrived && !triangle.hit, "{:?}", triangle.end());
 }
 
 #[test]
 fn figure_3_9_equation_15_alone_circles_a_target_in_a_free_sector() {
-    let world = World::new(&["            ", "  S      T  ", "            "]);
-    let straight = fly(&world, VfhConfig { continuity: 0, ..VfhConfig::thesis() }, 60.0);
-    let alone =
-        fly(&world, VfhConfig { straight_at_target: false, continuity: 0, ..VfhConfig::thesis() }, 60.0);
-    let distance = 7.0 * TILE;
+    let (straight, alone) = (scenes::free_thesis(true), scenes::free_thesis(false));
+    let distance = 7.0 * world::TILE;
     assert!(straight.arrived && alone.arrived);
-    assert!(length(&straight.path) < 1.02 * distance);
+    assert!(straight.length() < 1.02 * distance);
     // A course held s_max / 2 = 37.5 degrees off the target is a spiral, longer by 1 / cos(37.5 degrees).
-    assert!(length(&alone.path) > 1.2 * (distance - 0.1), "{}", length(&alone.path));
+    assert!(alone.length() > 1.2 * (distance - 0.1), "{}", alone.length());
+    // All the way to the same side: tan(37.5 degrees) ln(1.4 / 0.1) = 2.0 rad in all.
     let turned: f32 = alone
         .path
         .windows(3)
         .map(|p| {
             let a = (p[1].1 - p[0].1).atan2(p[1].0 - p[0].0);
-            wrap((p[2].1 - p[1].1).atan2(p[2].0 - p[1].0) - a).abs()
+            wrap((p[2].1 - p[1].1).atan2(p[2].0 - p[1].0) - a)
         })
         .sum();
-    assert!(turned > 1.0, "turned {turned} rad");
+    assert!(turned.abs() > 1.6 && turned.abs() < 2.4, "turned {turned} rad");
 }
 
 #[test]
 fn figure_3_10_a_narrow_valley_is_flown_in_its_middle() {
-    // A gap of 1 m below the straight line to the target.
-    let world = World::new(&[
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-        "S        ##         T",
-        "                     ",
-        "                     ",
-        "                     ",
-        "                     ",
-        "                     ",
-        "         ##          ",
-        "         ##          ",
-        "         ##          ",
-    ]);
-    let flight = fly(&world, VfhConfig::tight(0.225), 60.0);
+    let flight = scenes::narrow_valley_ours();
     assert!(flight.arrived, "{:?}", flight.path.last());
-    assert!(flight.nearest > 0.225, "{}", flight.nearest);
+    assert!(flight.nearest > RADIUS_M, "{}", flight.nearest);
     let crossing: Vec<f32> = flight.path.iter().filter(|p| (1.8..2.2).contains(&p.0)).map(|p| p.1).collect();
-    let middle = 5.5 * TILE;
-    assert!(crossing.iter().all(|y| (y - middle).abs() < 0.2), "{crossing:?}");
-}
-
-/// Nearest approach to a wall across the way, with the speed that the density leaves.
-fn nearest_with_threshold(threshold: f32) -> f32 {
-    let world = World::new(&[
-        "            ###   ",
-        "            ###   ",
-        "            ###   ",
-        "            ###   ",
-        "  S         ###  T",
-        "            ###   ",
-        "            ###   ",
-        "            ###   ",
-        "            ###   ",
-    ]);
-    let config = VfhConfig {
-        threshold_high: threshold,
-        threshold_low: threshold,
-        // Always at full speed, so that only the threshold decides when it turns away.
-        slow_density: 1e6,
-        ..VfhConfig::tight(0.225)
-    };
-    fly(&world, config, 12.0).nearest
+    assert!(!crossing.is_empty());
+    assert!(crossing.iter().all(|y| (y - scenes::GAP_MIDDLE_M).abs() < 0.2), "{crossing:?}");
+    let thesis = scenes::narrow_valley_thesis();
+    assert!(thesis.arrived && thesis.has(Reason::NarrowValley) && !thesis.hit);
 }
 
 #[test]
-fn figure_3_11_a_threshold_far_too_high_sees_the_obstacle_too_late() {
-    assert!(nearest_with_threshold(20_000.0) < 0.1);
-    assert!(nearest_with_threshold(2.5) > 0.225);
+fn figure_3_11_a_threshold_far_too_high_still_turns_away_when_flown_slowly_and_hits_when_flown_fast() {
+    let (slow, fast) =
+        (scenes::threshold_too_high(scenes::SLOW_M_S), scenes::threshold_too_high(scenes::FAST_M_S));
+    assert!(slow.arrived && !slow.hit, "{:?}", slow.end());
+    assert!(fast.hit, "{:?}", fast.end());
+    // The same of our own widened cells on a grid that only grows, at 400 times their threshold.
+    let ours = |cruise_m_s: f32| {
+        let config = VfhConfig {
+            threshold_high: 1000.0,
+            threshold_low: 1000.0,
+            slow_density: 1e9,
+            ..VfhConfig::tight(RADIUS_M)
+        };
+        let trial = Trial { rules: avoid::GridRules::thesis(), cruise_m_s, ..scenes::scanning() };
+        fly(&scenes::wall_across(), &mut scenes::vfh(config), &trial)
+    };
+    let (slow, fast) = (ours(0.1), ours(1.0));
+    assert!(slow.arrived && slow.nearest > RADIUS_M, "{}", slow.nearest);
+    assert!(fast.hit, "{:?}", fast.end());
+    // And at their own threshold they keep their distance at either speed.
+    for cruise_m_s in [0.1, 1.0] {
+        let kept =
+            fly(&scenes::wall_across(), &mut scenes::ours(), &Trial { cruise_m_s, ..scenes::scanning() });
+        assert!(kept.arrived && kept.nearest > RADIUS_M, "{cruise_m_s}: {}", kept.nearest);
+    }
+}
+
+#[test]
+fn figure_3_12_a_threshold_far_too_low_closes_a_passage() {
+    let (good, low) = (scenes::passage_with_threshold(2.0), scenes::passage_with_threshold(scenes::LOW));
+    assert!(good.arrived && !good.hit, "{:?}", good.end());
+    // It never comes within a metre of the passage, whose line is at x = 2.4 m.
+    let farthest = low.path.iter().map(|p| p.0).fold(0.0, f32::max);
+    assert!(!low.arrived && farthest < 1.4, "{farthest}");
+    let ahead = |threshold: f32| scenes::look_at_passage(threshold).1;
+    assert_eq!(ahead(2.0).blocked[0], 0);
+    assert_eq!(ahead(scenes::LOW).blocked[0], 1);
 }
 
 /// A gap of 1 m between two certain posts, 1 m ahead.
@@ -222,15 +126,13 @@ fn gap() -> Vec<u8> {
 }
 
 #[test]
-fn figure_3_12_a_threshold_far_too_low_closes_a_gap() {
+fn figure_3_12_from_outside_a_threshold_far_too_low_closes_a_gap() {
     let config = |threshold| VfhConfig {
         threshold_high: threshold,
         threshold_low: threshold,
-        smoothing: Smoothing13,
-        ..VfhConfig::tight(0.225)
+        smoothing: Smoothing::Triangle,
+        ..VfhConfig::tight(RADIUS_M)
     };
-    #[expect(non_upper_case_globals, reason = "the equation's number reads better")]
-    const Smoothing13: avoid::Smoothing = avoid::Smoothing::Triangle;
     let (open, free) = decide(&mut Vfh::new(config(40.0)).unwrap(), &gap(), 0.0, 3.0);
     let (shut, closed) = decide(&mut Vfh::new(config(0.05)).unwrap(), &gap(), 0.0, 3.0);
     assert_eq!(open.reason, Reason::TargetSafe);
@@ -313,4 +215,47 @@ fn a_parameter_out_of_range_is_refused_by_name() {
     assert_eq!(error.field, "reach_m");
     assert!(Vfh::new(VfhConfig { threshold_low: 3.0, ..VfhConfig::tight(0.2) }).is_err());
     assert!(Vfh::new(VfhConfig { s_max: 0, ..VfhConfig::tight(0.2) }).is_err());
+}
+
+#[test]
+fn the_thesis_counts_what_stands_behind_the_target_and_we_do_not() {
+    let window = Window::around(0.01, 0.01).unwrap();
+    let mut cells = vec![0u8; CELLS];
+    for i in -4..=4 {
+        cells[window.index(1.01, 0.01 + 0.05 * i as f32).unwrap()] = 40;
+    }
+    let reason = |config| decide(&mut Vfh::new(config).unwrap(), &cells, 0.0, 0.4).0.reason;
+    assert_eq!(reason(VfhConfig::tight(RADIUS_M)), Reason::TargetSafe);
+    assert_ne!(reason(VfhConfig::thesis()), Reason::TargetSafe);
+}
+
+#[test]
+fn the_thesis_flies_the_nearest_valley_even_if_it_leads_back() {
+    // Everything but straight behind is full of readings.
+    let window = Window::around(0.0, 0.0).unwrap();
+    let mut cells = vec![0u8; CELLS];
+    for k in (0..720).filter(|k| !(340..=380).contains(k)) {
+        let a = (k as f32 * 0.5).to_radians();
+        cells[window.index(0.7 * a.cos(), 0.7 * a.sin()).unwrap()] = 40;
+    }
+    let decide = |config| decide(&mut Vfh::new(config).unwrap(), &cells, 0.0, 3.0).0;
+    assert_eq!(decide(VfhConfig::tight(RADIUS_M)).reason, Reason::Blocked);
+    let thesis = decide(VfhConfig::thesis());
+    assert_eq!(thesis.reason, Reason::NarrowValley);
+    assert!(thesis.direction_rad.unwrap().abs() > 2.9, "{thesis:?}");
+}
+
+#[test]
+fn the_speed_of_the_thesis_is_full_in_the_clear_and_three_quarters_at_its_threshold() {
+    // V = Vmax (1 - min(h, hm) / hm), hm 8: one reading at distance d has h = 1/2 (5 - 5/81 d) of its own sector.
+    let mut cells = vec![0u8; CELLS];
+    let window = Window::around(0.01, 0.01).unwrap();
+    let speed = |cells: &[u8]| {
+        let mut vfh = Vfh::new(VfhConfig { threshold_high: 9.0, threshold_low: 9.0, ..VfhConfig::thesis() });
+        decide(vfh.as_mut().unwrap(), cells, 0.0, 3.0).0.speed_m_s
+    };
+    assert_eq!(speed(&cells), 0.5);
+    cells[window.index(1.01, 0.01).unwrap()] = 8;
+    let h = 0.5 * (5.0 - 5.0 / 81.0 * 20.0);
+    assert!((speed(&cells) - 0.5 * (1.0 - h / 8.0)).abs() < 1e-3);
 }
