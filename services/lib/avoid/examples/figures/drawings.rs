@@ -223,7 +223,7 @@ fn density() -> String {
         );
     }
     svg.finish(
-        "Half a metre before the gap of figure 3.10. Blue: raw. Orange: smoothed. Red: threshold, in proportion to the smoother's gain.",
+        "0.7 m before the gap of figure 3.10. Blue: raw. Orange: smoothed. Red: threshold, in proportion to the smoother's gain.",
     )
 }
 
