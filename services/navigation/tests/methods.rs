@@ -54,10 +54,8 @@ fn each_method_steers_by_itself_and_none_touches() {
 
 #[test]
 fn the_method_makes_the_difference_and_nothing_else() {
-    let (said, unsaid) = (
-        fly(Method::Vfh),
-        follow(&world(ROWS, 0.1), &[find(ROWS, 'S', 0.1), find(ROWS, 'T', 0.1)], 60.0),
-    );
+    let (said, unsaid) =
+        (fly(Method::Vfh), follow(&world(ROWS, 0.1), &[find(ROWS, 'S', 0.1), find(ROWS, 'T', 0.1)], 60.0));
     assert_eq!(said.path, unsaid.path, "it flies the same twice");
     assert_ne!(fly(Method::Thesis).path, said.path);
     assert_ne!(fly(Method::Potential).path, said.path);

@@ -8,9 +8,10 @@ use avoid::{
     Avoider, Beam, CELLS, Echo, GridRules, Histogram, PotentialConfig, PotentialField, SECTORS, Situation,
     Smoothing, Vfh, VfhConfig, WallLayer, Window,
 };
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, SamplingMode, criterion_group, criterion_main};
 use std::f32::consts::TAU;
 use std::hint::black_box;
+use std::time::Duration;
 
 /// A corridor 2.2 m wide along x with doors, walls 15 cm thick.
 fn solid(x: f32, y: f32) -> bool {
@@ -86,6 +87,11 @@ fn decisions(c: &mut Criterion) {
     ];
     for (place, walls) in [("corridor", walls.cells()), ("open", &[][..])] {
         let mut group = c.benchmark_group(format!("decision_81x81_{place}"));
+        // Many short samples: on a loaded machine their median (`-- --verbose`) is that of those that ran undisturbed.
+        group
+            .sampling_mode(SamplingMode::Flat)
+            .sample_size(2000)
+            .measurement_time(Duration::from_millis(200));
         for (name, avoider) in &mut methods {
             let (mut raw, mut smoothed, mut blocked) = ([0.0; SECTORS], [0.0; SECTORS], [0; SECTORS]);
             group.bench_function(*name, |b| {
