@@ -13,8 +13,10 @@ pub struct Config {
     pub clutter: String,
     /// Where the drone stands at first: `pad` or `room` (anywhere, any heading).
     pub start: String,
-    /// Which firmware the flight controller plays.
+    /// Which firmware the flight controller plays: a name of [`Firmware`].
     pub firmware: String,
+    /// Whether the flight controller has a magnetometer; without, its heading drifts with the gyro.
+    pub magnetometer: bool,
     /// How its failsafe is set: `factory` (the aircraft falls) or `level-descent` (FACTS 1, mitigation).
     pub failsafe: String,
     /// Share of the battery's charge at the start.
@@ -30,7 +32,8 @@ impl Default for Config {
         Self {
             clutter: "full".to_owned(),
             start: "pad".to_owned(),
-            firmware: "betaflight-2025.12".to_owned(),
+            firmware: Firmware::default().name().to_owned(),
+            magnetometer: true,
             failsafe: "factory".to_owned(),
             charge: 1.0,
             dead_sonars: Vec::new(),
@@ -48,7 +51,7 @@ impl Validate for Config {
             return Err(ConfigError::range("start", &self.start, "pad, room"));
         }
         if Firmware::by_name(&self.firmware).is_none() {
-            return Err(ConfigError::range("firmware", &self.firmware, Firmware::NAMES.join(", ")));
+            return Err(ConfigError::range("firmware", &self.firmware, Firmware::names()));
         }
         if !FAILSAFES.contains(&self.failsafe.as_str()) {
             return Err(ConfigError::range("failsafe", &self.failsafe, FAILSAFES.join(", ")));
@@ -87,15 +90,18 @@ impl Config {
             })?;
             dead_sonars |= 1 << index;
         }
+        let firmware = Firmware::by_name(&self.firmware).unwrap_or_default();
         let failsafe = if self.failsafe == LEVEL_DESCENT {
-            FailsafeSettings::level_descent((hover_us(vehicle) - UNDER_HOVER_US) as u16)
+            let low_us = f32::from(firmware.personality().low_throttle_us);
+            FailsafeSettings::level_descent((hover_us(vehicle, low_us) - UNDER_HOVER_US) as u16)
         } else {
-            FailsafeSettings::default()
+            FailsafeSettings::factory(firmware)
         };
         Ok(Options {
             clutter: self.clutter(),
             seed,
-            firmware: Firmware::by_name(&self.firmware).unwrap_or_default(),
+            firmware,
+            magnetometer: self.magnetometer,
             failsafe,
             start: start_place(&self.start).unwrap_or_default(),
             charge: self.charge,
@@ -106,11 +112,12 @@ impl Config {
 }
 
 /// Hover throttle on a half-full battery by the vehicle file: what an installer would find out.
-fn hover_us(vehicle: &manifest::Vehicle) -> f32 {
+/// `low_us`: where the firmware's throttle begins.
+fn hover_us(vehicle: &manifest::Vehicle, low_us: f32) -> f32 {
     const HALF_FULL: f32 = 0.92;
     let idle = vehicle.motors.idle_fraction;
     let command = vehicle.hover_fraction().sqrt() / HALF_FULL;
-    1050.0 + 950.0 * ((command - idle) / (1.0 - idle)).clamp(0.0, 1.0)
+    low_us + (2000.0 - low_us) * ((command - idle) / (1.0 - idle)).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]

@@ -36,13 +36,14 @@ impl AttitudeFilter {
         }
     }
 
-    /// One step of `dt` seconds; `heading` is the compass, counter-clockwise, radians.
+    /// One step of `dt` seconds. `heading`: the compass, counter-clockwise, radians, and whether there is one; without,
+    /// the estimate begins there and then follows the gyro alone, bias and all.
     pub(crate) fn step(
         &mut self,
         dt: f64,
         gyro: &Vector3<f64>,
         accelerometer: &Vector3<f64>,
-        heading: f64,
+        (heading, compass): (f64, bool),
         armed: bool,
         gain: f64,
     ) {
@@ -61,15 +62,17 @@ impl AttitudeFilter {
         if HEALTHY.contains(&(force / GRAVITY_M_S2)) {
             rates += (self.accelerometer / force).cross(&up) * gain;
         }
-        let q = self.body_to_earth.as_ref();
-        let ahead_x = 1.0 - 2.0 * (q.j * q.j + q.k * q.k);
-        let ahead_y = 2.0 * (q.i * q.j + q.w * q.k);
-        let (sin, cos) = heading.sin_cos();
-        let length = ahead_x.hypot(ahead_y).max(1e-6);
-        // Sine of the heading's error; behind it, full pull, so that it never rests a half turn off.
-        let (across, along) = (ahead_x * sin - ahead_y * cos, ahead_x * cos + ahead_y * sin);
-        let error = if along < 0.0 { across.signum() } else { across / length };
-        rates += up * (gain * error);
+        if compass {
+            let q = self.body_to_earth.as_ref();
+            let ahead_x = 1.0 - 2.0 * (q.j * q.j + q.k * q.k);
+            let ahead_y = 2.0 * (q.i * q.j + q.w * q.k);
+            let (sin, cos) = heading.sin_cos();
+            let length = ahead_x.hypot(ahead_y).max(1e-6);
+            // Sine of the heading's error; behind it, full pull, so that it never rests a half turn off.
+            let (across, along) = (ahead_x * sin - ahead_y * cos, ahead_x * cos + ahead_y * sin);
+            let error = if along < 0.0 { across.signum() } else { across / length };
+            rates += up * (gain * error);
+        }
 
         let half = rates * (0.5 * dt);
         let turn = Quaternion::new(1.0, half.x, half.y, half.z);
@@ -114,11 +117,26 @@ mod tests {
         let tilted = UnitQuaternion::from_euler_angles(0.1, -0.05, 0.0).inverse()
             * Vector3::new(0.0, 0.0, GRAVITY_M_S2);
         for _ in 0..10_000 {
-            filter.step(0.001, &Vector3::zeros(), &tilted, 2.5, false, 0.25);
+            filter.step(0.001, &Vector3::zeros(), &tilted, (2.5, true), false, 0.25);
         }
         let (roll, pitch) = filter.tilt();
         assert!((roll - 0.1).abs() < 1e-3 && (pitch + 0.05).abs() < 1e-3, "{roll} {pitch}");
         assert!((filter.heading() - 2.5).abs() < 1e-3, "{}", filter.heading());
+    }
+
+    #[test]
+    fn without_a_compass_the_heading_drifts_with_the_gyro_and_level_does_not() {
+        let mut filter = AttitudeFilter::new();
+        let bias = Vector3::new(8e-4, -8e-4, 8e-4);
+        for step in 0..60_000 {
+            // What a compass would say is not listened to after the first moment.
+            let heading = if step == 0 { 1.0 } else { -2.0 };
+            filter.step(0.001, &bias, &Vector3::new(0.0, 0.0, GRAVITY_M_S2), (heading, false), false, 0.25);
+        }
+        // 8e-4 rad/s for a minute, from where it began: 2.75 degrees.
+        assert!((filter.heading() - 1.0 - 0.048).abs() < 1e-3, "{}", filter.heading());
+        let (roll, pitch) = filter.tilt();
+        assert!(roll.abs() < 5e-3 && pitch.abs() < 5e-3, "{roll} {pitch}");
     }
 
     #[test]
@@ -131,7 +149,7 @@ mod tests {
         filter.started = true;
         filter.body_to_earth = UnitQuaternion::from_euler_angles(0.0, truth, 0.0);
         for _ in 0..1200 {
-            filter.step(0.001, &Vector3::zeros(), &Vector3::new(0.0, 0.0, 10.0), 0.0, true, 0.25);
+            filter.step(0.001, &Vector3::zeros(), &Vector3::new(0.0, 0.0, 10.0), (0.0, true), true, 0.25);
         }
         let told = filter.tilt().1.to_degrees();
         assert!((told - 10.7).abs() < 1.0, "{told}");

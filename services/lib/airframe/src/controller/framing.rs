@@ -29,6 +29,8 @@ enum State {
 #[derive(Clone, Debug)]
 pub(crate) struct Decoder {
     state: State,
+    /// Native v2 is understood at all.
+    knows_v2: bool,
     v2: bool,
     header: [u8; 5],
     length: usize,
@@ -38,9 +40,10 @@ pub(crate) struct Decoder {
 }
 
 impl Decoder {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(knows_v2: bool) -> Self {
         Self {
             state: State::Idle,
+            knows_v2,
             v2: false,
             header: [0; 5],
             length: 0,
@@ -64,8 +67,8 @@ impl Decoder {
                 }
             }
             State::Dollar => {
-                self.v2 = byte == b'X';
-                self.state = if byte == b'M' || byte == b'X' { State::Version } else { State::Idle };
+                self.v2 = byte == b'X' && self.knows_v2;
+                self.state = if byte == b'M' || self.v2 { State::Version } else { State::Idle };
             }
             State::Version => {
                 self.sum = 0;
@@ -163,7 +166,11 @@ mod tests {
     use super::*;
 
     fn requests(bytes: &[u8]) -> Vec<(u16, Vec<u8>)> {
-        let mut decoder = Decoder::new();
+        requests_of(bytes, true)
+    }
+
+    fn requests_of(bytes: &[u8], knows_v2: bool) -> Vec<(u16, Vec<u8>)> {
+        let mut decoder = Decoder::new(knows_v2);
         let mut all = Vec::new();
         for byte in bytes {
             if let Some(request) = decoder.push(*byte) {
@@ -184,6 +191,13 @@ mod tests {
         // MSP_API_VERSION, as every configurator sends it first.
         assert_eq!(requests(b"$M<\x00\x01\x01"), [(1, vec![])]);
         assert_eq!(requests(b"$X<\x00\x64\x00\x00\x00\x8f"), [(100, vec![])]);
+    }
+
+    #[test]
+    fn an_old_firmware_passes_over_version_two() {
+        let both = b"$X<\x00\x64\x00\x00\x00\x8f$M<\x00\x6c\x6c";
+        assert_eq!(requests_of(both, false), [(108, vec![])]);
+        assert_eq!(requests_of(both, true).len(), 2);
     }
 
     #[test]

@@ -28,13 +28,6 @@ const AIRMODE_START: f64 = 0.25;
 /// right, rear left, front left.
 const MIX: [[f64; 3]; 4] = [[-1.0, 1.0, 1.0], [-1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [1.0, -1.0, 1.0]];
 
-/// The stick law at default rates, as a share of the largest: (70 x + 600 x |x|) / 670.
-pub(crate) fn stick_share(channel_us: f64, personality: &Personality) -> f64 {
-    let [centre, largest] = personality.rates_deg_s;
-    let x = ((channel_us - 1500.0) / 500.0).clamp(-1.0, 1.0);
-    (centre * x + (largest - centre) * x * x.abs()) / largest
-}
-
 /// State of the loops.
 #[derive(Clone, Debug)]
 pub(crate) struct Loops {
@@ -99,14 +92,16 @@ impl Loops {
         attitude: &AttitudeFilter,
         personality: &Personality,
     ) -> [f64; 3] {
-        let largest = personality.rates_deg_s[1].to_radians();
-        let limit = personality.angle_limit_deg.to_radians();
-        let share = [ROLL, PITCH, YAW].map(|stick| stick_share(self.sticks[stick], personality));
-        let mut wanted = [share[0] * largest, share[1] * largest, -share[2] * largest];
+        let law = &personality.stick;
+        let largest = law.largest_rate_deg_s().to_radians();
+        let limit = law.largest_angle_deg().to_radians();
+        let sticks = [ROLL, PITCH, YAW].map(|stick| ((self.sticks[stick] - 1500.0) / 500.0).clamp(-1.0, 1.0));
+        let rates = sticks.map(|x| law.rate_share(x));
+        let mut wanted = [rates[0] * largest, rates[1] * largest, -rates[2] * largest];
         if angle_mode {
             let (roll, pitch) = attitude.tilt();
             for (axis, told) in [roll, pitch].into_iter().enumerate() {
-                let target = share[axis] * limit;
+                let target = law.angle_share(sticks[axis]) * limit;
                 let speed = (target - self.targets[axis]) / dt;
                 self.targets[axis] = target;
                 self.feedforward[axis] += (speed - self.feedforward[axis]) * (FEEDFORWARD_PER_S * dt);
@@ -164,17 +159,6 @@ impl Loops {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::controller::personality::BETAFLIGHT_2025_12;
-
-    #[test]
-    fn the_stick_law_is_the_measured_one() {
-        // FACTS 1: 100 us gives 3.4, 200 gives 11.1, 300 gives 23.1 degrees.
-        for (offset, degrees) in [(100.0, 3.4), (200.0, 11.1), (300.0, 23.1), (500.0, 60.0), (-200.0, -11.1)]
-        {
-            let angle = 60.0 * stick_share(1500.0 + offset, &BETAFLIGHT_2025_12);
-            assert!((angle - degrees).abs() < 0.25, "{offset}: {angle}");
-        }
-    }
 
     #[test]
     fn no_motor_leaves_its_range_and_torque_comes_before_throttle() {

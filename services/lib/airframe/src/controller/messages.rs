@@ -1,6 +1,6 @@
 //! What the firmware answers: payloads of the MSP messages of FACTS 1.
 
-use super::personality::{FailsafeSettings, Personality, Procedure};
+use super::personality::{FailsafeSettings, Personality, Procedure, StatusLayout};
 use super::receiver::{CHANNELS, PITCH, ROLL, Receiver, THROTTLE, YAW};
 use crate::vehicle::GRAVITY_M_S2;
 
@@ -29,12 +29,9 @@ pub(super) const SET_MOTOR: u16 = 214;
 
 /// Outputs that the firmware knows; a quadrotor uses the first four.
 pub(super) const MOTORS: usize = 8;
-/// Slots of MSP_MODE_RANGES.
-const MODE_SLOTS: usize = 20;
-/// Gyro, accelerometer, magnetometer present: bits of the sensor word.
-const SENSORS: u16 = 1 | 1 << 2 | 1 << 5;
-/// Receiver over MSP and air mode: bits 14 and 22 of the feature word.
-const FEATURES: u32 = 1 << 14 | 1 << 22;
+/// Accelerometer and gyro present, and the magnetometer: bits of the sensor word.
+const SENSORS: u16 = 1 | 1 << 5;
+const MAGNETOMETER: u16 = 1 << 2;
 /// Permanent ids of the boxes whose state is told.
 const BOX_ARM: u8 = 0;
 const BOX_ANGLE: u8 = 1;
@@ -54,6 +51,7 @@ pub(super) struct View<'a> {
     pub(super) volts: f64,
     pub(super) amps: f64,
     pub(super) drawn_mah: f64,
+    pub(super) magnetometer: bool,
 }
 
 /// A payload in the making; what does not fit is left out.
@@ -130,19 +128,19 @@ pub(super) fn answer(code: u16, view: &View<'_>, out: &mut Payload) -> bool {
                 out.put(p.version_text.as_bytes());
             }
         }
-        MODE_RANGES => mode_ranges(out),
-        FEATURE_CONFIG => out.u32(FEATURES),
+        MODE_RANGES => mode_ranges(p, out),
+        FEATURE_CONFIG => out.u32(p.features),
         RX_CONFIG => rx_config(p, out),
-        RX_MAP => out.put(&p.rx_map),
-        FAILSAFE_CONFIG => failsafe_config(view.failsafe, out),
-        RXFAIL_CONFIG => rxfail_config(view.failsafe, out),
+        RX_MAP => out.put(p.rx_map.get(..p.rx_map_length).unwrap_or(&p.rx_map)),
+        FAILSAFE_CONFIG => failsafe_config(view, out),
+        RXFAIL_CONFIG if p.knows_rxfail => rxfail_config(view.failsafe, out),
         STATUS | STATUS_EX => status(code == STATUS_EX, view, out),
         RAW_IMU => raw_imu(view, out),
         MOTOR => view.motors_us.iter().for_each(|motor| out.u16(*motor)),
-        RC => rc(view.receiver, out),
+        RC => rc(view, out),
         ATTITUDE => attitude(view, out),
         // No barometer on this board: height and climb are zero.
-        ALTITUDE => out.pad_to(6),
+        ALTITUDE => out.pad_to(p.altitude_length),
         ANALOG => analog(view, out),
         BOX_NAMES => {
             for (_, name) in p.boxes {
@@ -157,12 +155,17 @@ pub(super) fn answer(code: u16, view: &View<'_>, out: &mut Payload) -> bool {
 }
 
 /// Roll, pitch, YAW, THROTTLE: not the order of SET_RAW_RC (FACTS 1).
-fn rc(receiver: &Receiver, out: &mut Payload) {
-    let values = receiver.values();
+fn rc(view: &View<'_>, out: &mut Payload) {
+    if view.personality.rc_needs_receiver && !view.receiver.is_known() {
+        return;
+    }
+    let values = view.receiver.values();
     for channel in [ROLL, PITCH, YAW, THROTTLE] {
         out.u16(values[channel]);
     }
     values[4..].iter().for_each(|value| out.u16(*value));
+    // Channels that no frame of ours reaches rest in the middle.
+    (CHANNELS..view.personality.channels).for_each(|_| out.u16(1500));
 }
 
 /// Tenths of degrees; yaw whole degrees clockwise, cut off and not rounded.
@@ -179,6 +182,7 @@ fn analog(view: &View<'_>, out: &mut Payload) {
     out.u16(if view.receiver.is_lost() { 0 } else { 1023 });
     out.i16((view.amps * 100.0).clamp(-32000.0, 32000.0));
     out.u16((view.volts * 100.0).round().clamp(0.0, 65535.0) as u16);
+    out.pad_to(view.personality.analog_length);
 }
 
 fn status(extended: bool, view: &View<'_>, out: &mut Payload) {
@@ -195,9 +199,18 @@ fn status(extended: bool, view: &View<'_>, out: &mut Payload) {
     }
     out.u16(125);
     out.u16(0);
-    out.u16(SENSORS);
+    out.u16(SENSORS | if view.magnetometer { MAGNETOMETER } else { 0 });
     out.u32(modes);
     out.u8(0);
+    let StatusLayout::Flagged { tail } = p.status else {
+        if extended {
+            out.u16(12);
+            out.u16(view.receiver.blocks() as u16);
+            // All six sides of the accelerometer are calibrated.
+            out.u8(0x3f);
+        }
+        return;
+    };
     out.u16(12);
     if extended {
         out.u8(4);
@@ -207,18 +220,20 @@ fn status(extended: bool, view: &View<'_>, out: &mut Payload) {
     }
     // No further mode bytes: all boxes fit in the word.
     out.u8(0);
-    out.u8((p.arm_switch_bit + 1) as u8);
+    // The arm switch is the last flag.
+    out.u8((p.flags.arm_switch + 1) as u8);
     out.u32(view.receiver.blocks());
+    let end = out.length + tail;
     out.u8(0);
     out.u16(41);
-    out.pad_to(out.length + p.status_tail);
+    out.pad_to(end);
 }
 
 /// ARM on AUX1 and ANGLE on AUX2, from 1700 to 2100: in steps of 25 us from 900.
-fn mode_ranges(out: &mut Payload) {
+fn mode_ranges(personality: &Personality, out: &mut Payload) {
     out.put(&[BOX_ARM, 0, 32, 48]);
     out.put(&[BOX_ANGLE, 1, 32, 48]);
-    out.pad_to(4 * MODE_SLOTS);
+    out.pad_to(4 * personality.mode_slots);
 }
 
 fn rx_config(personality: &Personality, out: &mut Payload) {
@@ -233,9 +248,11 @@ fn rx_config(personality: &Personality, out: &mut Payload) {
     out.pad_to(personality.rx_config_length);
 }
 
-fn failsafe_config(settings: &FailsafeSettings, out: &mut Payload) {
+fn failsafe_config(view: &View<'_>, out: &mut Payload) {
+    let settings = view.failsafe;
     out.u8(settings.delay_ds);
-    out.u8(settings.landing_s);
+    let landing = u16::from(settings.landing_s) * view.personality.landing_units_per_s;
+    out.u8(landing.min(u8::MAX.into()) as u8);
     out.u16(settings.throttle_us);
     out.u8(0);
     out.u16(100);
@@ -243,6 +260,7 @@ fn failsafe_config(settings: &FailsafeSettings, out: &mut Payload) {
         Procedure::AutoLand => 0,
         Procedure::Drop => 1,
     });
+    out.pad_to(view.personality.failsafe_length);
 }
 
 /// Mode (0 automatic, 1 hold, 2 value) and value of each channel, roll pitch yaw throttle first.

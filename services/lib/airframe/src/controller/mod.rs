@@ -9,7 +9,10 @@ mod personality;
 mod receiver;
 mod wire;
 
-pub use personality::{BETAFLIGHT_2025_12, FailsafeSettings, Firmware, Personality, Procedure};
+pub use personality::{
+    BETAFLIGHT_4_5, BETAFLIGHT_2025_12, BETAFLIGHT_2026_12, FLIP32, FailsafeSettings, Firmware, Flags,
+    INAV_9_1, Personality, Procedure, StatusLayout, StickLaw,
+};
 pub use wire::{BYTE_NS, Wire};
 
 pub(crate) use framing::encode_v2;
@@ -31,7 +34,8 @@ pub struct Senses {
     pub gyro: Vector3<f64>,
     /// Specific force, m/s^2, body frame.
     pub accelerometer: Vector3<f64>,
-    /// Compass, counter-clockwise from its zero, radians.
+    /// Compass, counter-clockwise from its zero, radians. Without a magnetometer only the first one counts, for where the
+    /// board's own heading begins.
     pub heading_rad: f64,
     /// Battery voltage as measured.
     pub volts: f64,
@@ -61,6 +65,7 @@ pub struct Controller {
     motors_us: [u16; MOTORS],
     senses: Senses,
     commands_handled: u64,
+    magnetometer: bool,
 }
 
 impl Controller {
@@ -74,13 +79,13 @@ impl Controller {
             failsafe,
             attitude: AttitudeFilter::new(),
             loops: Loops::new(idle.clamp(0.0, 0.3)),
-            receiver: Receiver::new(),
+            receiver: Receiver::new(personality),
             incoming: Wire::new(),
             outgoing: Wire::new(),
             buffer: [0; RECEIVE_BUFFER],
             buffered: 0,
             overruns: 0,
-            decoder: Decoder::new(),
+            decoder: Decoder::new(personality.speaks_v2),
             next_serial_ns: phase_ns % personality.serial_pass_ns,
             next_receiver_ns: phase_ns % personality.receiver_pass_ns,
             bench_us: [1000, 1000, 1000, 1000, 0, 0, 0, 0],
@@ -94,7 +99,15 @@ impl Controller {
                 drawn_mah: 0.0,
             },
             commands_handled: 0,
+            magnetometer: true,
         }
+    }
+
+    /// The board without its magnetometer: its heading begins anywhere and drifts with the gyro.
+    #[must_use]
+    pub fn without_magnetometer(mut self) -> Self {
+        self.magnetometer = false;
+        self
     }
 
     /// Bytes onto the wire towards the board.
@@ -127,7 +140,7 @@ impl Controller {
             dt,
             &senses.gyro,
             &senses.accelerometer,
-            senses.heading_rad,
+            (senses.heading_rad, self.magnetometer),
             self.receiver.is_armed(),
             self.personality.attitude_gain_per_s,
         );
@@ -195,8 +208,9 @@ impl Controller {
                     volts: self.senses.volts,
                     amps: self.senses.amps,
                     drawn_mah: self.senses.drawn_mah,
+                    magnetometer: self.magnetometer,
                 };
-                if code == messages::MULTIPLE_MSP {
+                if code == messages::MULTIPLE_MSP && self.personality.answers_several {
                     messages::multiple(
                         self.decoder.payload().get(..length).unwrap_or_default(),
                         &view,
@@ -219,9 +233,10 @@ impl Controller {
     }
 
     fn set_raw_rc(&mut self, now_ns: u64, count: usize) -> bool {
-        if count > CHANNELS {
+        if count > self.personality.channels {
             return false;
         }
+        let count = count.min(CHANNELS);
         let mut frame = [0_u16; CHANNELS];
         for (value, pair) in frame.iter_mut().zip(self.decoder.payload().chunks_exact(2)) {
             *value = u16::from_le_bytes([pair[0], pair[1]]);

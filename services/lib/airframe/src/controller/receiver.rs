@@ -1,6 +1,6 @@
 //! The receiver (MSP frames), loss of signal, failsafe, modes and arming.
 
-use super::personality::{FailsafeSettings, Personality, Procedure, block};
+use super::personality::{FailsafeSettings, Personality, Procedure};
 
 /// Channels of the firmware.
 pub(crate) const CHANNELS: usize = 18;
@@ -45,10 +45,13 @@ pub(crate) struct Receiver {
     switched_ns: Option<u64>,
     blocks: u32,
     armings: u32,
+    /// A frame has ever come.
+    known: bool,
 }
 
 impl Receiver {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(personality: &Personality) -> Self {
+        let flags = personality.flags;
         let mut values = [CENTRE_US; CHANNELS];
         values[THROTTLE] = LOWEST_US;
         Self {
@@ -61,13 +64,15 @@ impl Receiver {
             armed: false,
             latched: false,
             switched_ns: None,
-            blocks: block::RX_LOSS | block::BOOT_GRACE | block::CALIBRATING,
+            blocks: 1 << flags.rx_loss | 1 << flags.boot_grace | 1 << flags.calibrating,
             armings: 0,
+            known: false,
         }
     }
 
-    /// A frame in the receiver's order; at most [`CHANNELS`] values. What it does not carry reads as 0.
+    /// A frame in the receiver's order; what is beyond [`CHANNELS`] is not used. What it does not carry reads as 0.
     pub(crate) fn frame(&mut self, now_ns: u64, frame: &[u16], personality: &Personality) {
+        self.known = true;
         let mut flight_valid = true;
         for channel in 0..CHANNELS {
             let place = personality.rx_map.get(channel).map_or(channel, |place| usize::from(*place));
@@ -133,7 +138,8 @@ impl Receiver {
         let silent_ns = now_ns - self.valid_ns.unwrap_or(0);
         match self.failsafe {
             Failsafe::Idle => {
-                if self.armed && self.lost && silent_ns >= u64::from(settings.delay_ds) * 100_000_000 {
+                let delay_ns = personality.failsafe_base_ns + u64::from(settings.delay_ds) * 100_000_000;
+                if self.armed && self.lost && silent_ns >= delay_ns {
                     self.failsafe = match settings.procedure {
                         Procedure::Drop => {
                             self.armed = false;
@@ -146,7 +152,7 @@ impl Receiver {
                 }
             }
             Failsafe::Landing(until_ns) => {
-                if !self.lost {
+                if !self.lost && self.deflection_us() >= personality.recovery_stick_us {
                     self.failsafe = Failsafe::Idle;
                 } else if now_ns >= until_ns || !self.armed {
                     self.armed = false;
@@ -154,13 +160,13 @@ impl Receiver {
                 }
             }
             Failsafe::Latched(since) => {
-                let quiet = !self.lost && self.values[AUX1] < SWITCH_US;
+                let low = self.values[AUX1] < SWITCH_US;
+                let quiet = !self.lost && (low || !personality.rearm_low);
+                let needed_ns = personality.rearm_ns - personality.recovery_ns;
                 self.failsafe = match since {
                     _ if !quiet => Failsafe::Latched(None),
                     None => Failsafe::Latched(Some(now_ns)),
-                    Some(since) if now_ns - since >= personality.rearm_ns - personality.recovery_ns => {
-                        Failsafe::Idle
-                    }
+                    Some(since) if low && now_ns - since >= needed_ns => Failsafe::Idle,
                     since => Failsafe::Latched(since),
                 };
             }
@@ -168,18 +174,19 @@ impl Receiver {
     }
 
     fn run_arming(&mut self, now_ns: u64, tilt_rad: f64, personality: &Personality) {
+        let flags = &personality.flags;
         let mut blocks = 0;
         let mut raise = |wrong: bool, flag: u32| {
             if wrong {
-                blocks |= flag;
+                blocks |= 1 << flag;
             }
         };
-        raise(matches!(self.failsafe, Failsafe::Latched(_)), block::FAILSAFE);
-        raise(self.lost, block::RX_LOSS);
-        raise(self.values[THROTTLE] > personality.low_throttle_us, block::THROTTLE);
-        raise(tilt_rad > SMALL_ANGLE_RAD, block::ANGLE);
-        raise(now_ns < personality.boot_grace_ns, block::BOOT_GRACE);
-        raise(now_ns < CALIBRATION_NS, block::CALIBRATING);
+        raise(matches!(self.failsafe, Failsafe::Latched(_)), flags.failsafe);
+        raise(self.lost, flags.rx_loss);
+        raise(self.values[THROTTLE] > personality.low_throttle_us, flags.throttle);
+        raise(tilt_rad > SMALL_ANGLE_RAD, flags.angle);
+        raise(now_ns < personality.boot_grace_ns, flags.boot_grace);
+        raise(now_ns < CALIBRATION_NS, flags.calibrating);
 
         if self.values[AUX1] < SWITCH_US {
             self.armed = false;
@@ -200,12 +207,18 @@ impl Receiver {
             }
         }
         if self.latched {
-            blocks |= 1 << personality.arm_switch_bit;
+            blocks |= 1 << flags.arm_switch;
         }
         if self.armed {
-            blocks = 0;
+            // In flight it looks at nothing else any more, but a lost receiver is still told (FACTS 1).
+            blocks = u32::from(self.lost) << flags.rx_loss;
         }
         self.blocks = blocks;
+    }
+
+    /// How far roll, pitch and yaw are from their centres, together.
+    fn deflection_us(&self) -> u16 {
+        [ROLL, PITCH, YAW].iter().map(|stick| self.values[*stick].abs_diff(CENTRE_US)).sum()
     }
 
     /// What the sticks say now, failsafe included: roll, pitch, yaw, throttle.
@@ -218,6 +231,10 @@ impl Receiver {
 
     pub(crate) fn values(&self) -> &[u16; CHANNELS] {
         &self.values
+    }
+    /// Whether a receiver is known: a frame has come.
+    pub(crate) fn is_known(&self) -> bool {
+        self.known
     }
     pub(crate) fn is_armed(&self) -> bool {
         self.armed

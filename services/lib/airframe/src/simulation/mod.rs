@@ -13,7 +13,7 @@ mod tests;
 use crate::acoustics::{Acoustics, Echo, Echoes, GIVE_UP_S, Mount, Pose6};
 use crate::controller::{Controller, FailsafeSettings, Firmware, Senses};
 use crate::vehicle::{
-    Compass, FlowSensor, FlowSettings, Inertial, Quadrotor, Shape, Surroundings, Variation, normal,
+    Compass, FlowSensor, FlowSettings, Inertial, Quadrotor, Shape, Surroundings, Variation, normal, within,
 };
 use crate::world::draw::stream;
 use crate::world::{ClutterLevel, PadPlace, World, WorldError, WorldFile};
@@ -47,7 +47,10 @@ const MOTION: u64 = 102;
 const SONAR: u64 = 103;
 const FLOW: u64 = 104;
 const START: u64 = 105;
-const DISPLACEMENT: u64 = 106;
+const GYRO: u64 = 106;
+/// Scale error of a gyro that turns a heading without compass: the tolerance of the MPU-6000 family's data sheet, 3 %.
+const GYRO_SCALE: f64 = 0.03;
+const DISPLACEMENT: u64 = 107;
 
 /// Where the drone stands when the flight begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,6 +71,9 @@ pub struct Options {
     pub seed: u64,
     /// Which firmware the flight controller plays.
     pub firmware: Firmware,
+    /// Whether the flight controller has a magnetometer. Without, its heading begins at the compass's arbitrary zero and
+    /// then drifts with the gyro's bias (up to 2.75 degrees a minute) and scale.
+    pub magnetometer: bool,
     /// How its failsafe is set.
     pub failsafe: FailsafeSettings,
     /// Where the drone stands at first.
@@ -86,6 +92,7 @@ impl Default for Options {
             clutter: ClutterLevel::Full,
             seed: 0,
             firmware: Firmware::default(),
+            magnetometer: true,
             failsafe: FailsafeSettings::default(),
             start: StartPlace::default(),
             charge: 1.0,
@@ -165,6 +172,8 @@ pub struct Simulation {
     now_ns: u64,
     step: u64,
     senses: Senses,
+    /// What the gyro tells of a turn, over the turn; one with a compass, which corrects it.
+    turn_scale: f64,
     ground: GroundWatch,
     touch: Touch,
     wall_m: f64,
@@ -232,10 +241,16 @@ impl Simulation {
             amps: 0.0,
             drawn_mah: 0.0,
         };
+        let mut controller = Controller::new(options.firmware, options.failsafe, idle, phase_ns);
+        let mut turn_scale = 1.0;
+        if !options.magnetometer {
+            controller = controller.without_magnetometer();
+            turn_scale += within(&mut stream(options.seed, GYRO), GYRO_SCALE);
+        }
         Self {
             world,
             craft,
-            controller: Controller::new(options.firmware, options.failsafe, idle, phase_ns),
+            controller,
             inertial,
             compass,
             acoustics,
@@ -246,6 +261,7 @@ impl Simulation {
             now_ns: 0,
             step: 0,
             senses,
+            turn_scale,
             ground,
             touch,
             wall_m: 10.0,
@@ -287,6 +303,7 @@ impl Simulation {
         let shake = self.craft.motor_speeds().iter().sum::<f64>() * 0.25;
         (self.senses.gyro, self.senses.accelerometer) =
             self.inertial.sample(self.craft.motion(), shake, random);
+        self.senses.gyro.z *= self.turn_scale;
         let commands = self.controller.step(self.now_ns, STEP_S, &self.senses);
 
         self.ground.look(&self.world, &self.craft, self.step);

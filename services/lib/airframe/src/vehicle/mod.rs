@@ -19,7 +19,7 @@ pub use flow::{FlowSensor, FlowSettings, Ground, MSP2_SENSOR_OPTIC_FLOW, MSP2_SE
 pub use imu::Inertial;
 pub use shape::{Cover, Shape, Variation};
 
-pub(crate) use noise::normal;
+pub(crate) use noise::{normal, within};
 
 use gust::Gust;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};

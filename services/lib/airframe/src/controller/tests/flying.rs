@@ -21,7 +21,14 @@ fn a_tilt_step_answers_in_a_fraction_of_a_second() {
     let mut bench = Bench::armed(3, FailsafeSettings::default());
     let throttle = bench.hover(2.0, 12.0).round() as u16;
     // 8 degrees of roll.
-    let channels = [1500 + stick(8.0_f64.to_radians()).round() as u16, 1500, throttle, 1500, 2000, 2000];
+    let channels = [
+        1500 + stick(&BETAFLIGHT_2025_12.stick, 8.0_f64.to_radians()).round() as u16,
+        1500,
+        throttle,
+        1500,
+        2000,
+        2000,
+    ];
     bench.send(&channels);
     let start = bench.now;
     let half = bench.until(1.0, |b| b.craft.motion().angles().0.to_degrees() > 0.63 * 8.0);
@@ -38,7 +45,14 @@ fn a_tilt_step_answers_in_a_fraction_of_a_second() {
 fn attitude_is_wrong_under_acceleration_within_bounds() {
     let mut bench = Bench::armed(4, FailsafeSettings::default());
     let throttle = bench.hover(3.0, 14.0).round() as u16 + 10;
-    bench.send(&[1500, 1500 + stick(11.0_f64.to_radians()).round() as u16, throttle, 1500, 2000, 2000]);
+    bench.send(&[
+        1500,
+        1500 + stick(&BETAFLIGHT_2025_12.stick, 11.0_f64.to_radians()).round() as u16,
+        throttle,
+        1500,
+        2000,
+        2000,
+    ]);
     bench.run(1.2);
     let truth = bench.craft.motion().angles().1.to_degrees();
     let told = bench.controller.attitude().1.to_degrees();

@@ -1,5 +1,6 @@
 //! The virtual controller on a quadrotor over a flat floor, reached by MSP bytes only.
 
+mod firmwares;
 mod flying;
 mod link;
 mod protocol;
@@ -31,12 +32,16 @@ const ARM: [u16; 6] = [1500, 1500, 1000, 1500, 2000, 2000];
 
 impl Bench {
     fn new(seed: u64, height: f64, failsafe: FailsafeSettings) -> Self {
+        Self::with(Firmware::Betaflight2025_12, seed, height, failsafe)
+    }
+
+    fn with(firmware: Firmware, seed: u64, height: f64, failsafe: FailsafeSettings) -> Self {
         let vehicle = crate::testing::watchman();
         let (shape, pack) = Shape::new(&vehicle, &Variation::NONE);
         Self {
             craft: Quadrotor::new(shape, pack, 0.0, 0.0, 0.0, height),
             controller: Controller::new(
-                Firmware::Betaflight2025_12,
+                firmware,
                 failsafe,
                 f64::from(vehicle.motors.idle_fraction),
                 seed * 7_300_000,
@@ -128,7 +133,11 @@ impl Bench {
 
     /// Powered up, past the grace, armed, and flown to `height` with a height loop on the truth.
     fn armed(seed: u64, failsafe: FailsafeSettings) -> Self {
-        let mut bench = Self::new(seed, 0.0, failsafe);
+        Self::armed_with(Firmware::Betaflight2025_12, seed, failsafe)
+    }
+
+    fn armed_with(firmware: Firmware, seed: u64, failsafe: FailsafeSettings) -> Self {
+        let mut bench = Self::with(firmware, seed, 0.0, failsafe);
         bench.send(&IDLE);
         bench.run(5.2);
         bench.send(&ARM);
@@ -154,8 +163,9 @@ impl Bench {
             let (ax, ay) = (want(m.position.x, m.velocity.x), want(m.position.y, m.velocity.y));
             let forward = cos * ax + sin * ay;
             let left = cos * ay - sin * ax;
-            let pitch = 1500.0 + stick(forward / 9.81);
-            let roll = 1500.0 + stick(-left / 9.81);
+            let law = self.controller.personality.stick;
+            let pitch = 1500.0 + stick(&law, forward / 9.81);
+            let roll = 1500.0 + stick(&law, -left / 9.81);
             let channels = [roll, pitch, throttle, 1500.0, 2000.0, 2000.0].map(|c: f64| c.round() as u16);
             self.send(&channels);
             self.run(0.02);
@@ -168,11 +178,19 @@ impl Bench {
     }
 }
 
-/// Inverse of the stick law, as a companion would have it.
-fn stick(angle_rad: f64) -> f64 {
-    let share = (angle_rad.to_degrees().abs() / 60.0 * 670.0).min(150.0);
-    let x = (-70.0 + (70.0_f64 * 70.0 + 2400.0 * share).sqrt()) / 1200.0;
-    500.0 * x * angle_rad.signum()
+/// Inverse of the stick law, as a companion would have it: at most 13 degrees, found by halving.
+fn stick(law: &StickLaw, angle_rad: f64) -> f64 {
+    let wanted = angle_rad.to_degrees().abs().min(13.0);
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..40 {
+        let x = 0.5 * (low + high);
+        if law.largest_angle_deg() * law.angle_share(x) < wanted {
+            low = x;
+        } else {
+            high = x;
+        }
+    }
+    500.0 * low * angle_rad.signum()
 }
 
 fn v1(code: u8, payload: &[u8]) -> Vec<u8> {
