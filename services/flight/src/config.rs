@@ -30,7 +30,8 @@ impl Profile {
 pub struct Config {
     /// Who owns arming.
     pub profile: Profile,
-    /// MSP framing of what is sent: 2 has the better check byte, 1 is for firmware before 2018.
+    /// MSP framing of what is sent: 2 has the better check byte, and gives way to 1 where nobody answers to it (firmware
+    /// before 2018); 1 is 1 from the first byte.
     pub msp_version: u8,
     /// Channels this old are not flown: level with the learned trim, seconds.
     pub level_after_s: f64,

@@ -5,6 +5,7 @@ use crate::config::{Config, Profile};
 use crate::ladder::{Decision, Ladder};
 use crate::link::{Link, MAX_FRAME};
 use crate::outbox::Outbox;
+use crate::stick::StickLaw;
 use crate::wish::{AUX_ARM, HIGH_US, LOW_US, Wish, neutral};
 use crate::words::write_blocks;
 use core::fmt::{self, Write};
@@ -142,7 +143,8 @@ impl Core {
         }
         let mut out = [0; MAX_FRAME];
         if known && self.link.order_settled(now) && self.frame_due(now, decision.step) {
-            let (channels, count) = self.channels(now, &decision, raised, armed);
+            let (mut channels, count) = self.channels(now, &decision, raised, armed);
+            StickLaw::of(self.link.identity()).translate(&mut channels);
             if let Ok(length) = self.link.write_frame(now, &channels, count, &mut out) {
                 self.outbox.push(&out[..length]);
                 self.first_frame_ns.get_or_insert(now);

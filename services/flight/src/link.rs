@@ -1,6 +1,7 @@
 //! The conversation with the flight controller: bytes in, bytes out, time as an argument.
 
 use crate::arming::Evidence;
+use crate::framing::Framing;
 use crate::order::{ReceiverOrder, throttle_of};
 use crate::said::{AttitudeSample, Counts, Identity, Said, question_of, write};
 use crate::schedule::{Question, Schedule};
@@ -39,7 +40,7 @@ const MODES: [(u8, u32); 4] = [(0, 1), (1, 2), (27, 4), (50, 8)];
 /// The link, while the port is open.
 #[derive(Debug, Clone)]
 pub struct Link {
-    version: Version,
+    framing: Framing,
     decoder: Decoder<1024>,
     schedule: Schedule,
     /// When each question that is on its way was sent.
@@ -72,7 +73,7 @@ impl Link {
     #[must_use]
     pub fn new(now: u64, msp_version: u8) -> Self {
         Self {
-            version: if msp_version == 1 { Version::V1 } else { Version::V2 },
+            framing: Framing::new(now, msp_version),
             decoder: Decoder::new(),
             schedule: Schedule::new(now),
             asked_ns: [None; 10],
@@ -100,8 +101,9 @@ impl Link {
     pub fn reopened(&mut self, now: u64) {
         let order = self.order;
         let throttle_us = self.said.throttle_us;
-        let msp_version = if self.version == Version::V1 { 1 } else { 2 };
-        *self = Self::new(now, msp_version);
+        let framing = self.framing.reopened(now);
+        *self = Self::new(now, 2);
+        self.framing = framing;
         self.order = order;
         self.said.throttle_us = throttle_us;
     }
@@ -229,6 +231,7 @@ impl Link {
             },
         };
         if answered {
+            self.framing.answered(now, frame.version);
             self.answer_ns = Some(now);
             self.counts.answers = self.counts.answers.wrapping_add(1);
         } else {
@@ -318,7 +321,7 @@ impl Link {
         let order = self.order.unwrap_or(ReceiverOrder::AETR);
         let (arranged, count) = order.arrange(channels_us, count.min(18));
         let request = SetRawRc::new(arranged.get(..count).unwrap_or(&[])).map_err(FrameError::Channels)?;
-        let length = encode_request(out, self.version, &request).map_err(FrameError::Encode)?;
+        let length = encode_request(out, self.framing.version(), &request).map_err(FrameError::Encode)?;
         self.schedule.spend(now);
         self.frame_ns = Some(now);
         self.command_ns = Some(now);
@@ -347,6 +350,12 @@ impl Link {
                 self.imu_lost = self.imu_lost.min(MOST_UNANSWERED);
             }
         }
+        if self.framing.turn(now, self.silent(now)) {
+            // Whatever is on its way was not understood.
+            self.asked_ns = [None; 10];
+            self.schedule.hurry(Question::Status, now);
+            self.schedule.hurry(Question::Map, now);
+        }
         let since = |at: Option<u64>| at.map_or(u64::MAX, |at| now.saturating_sub(at));
         let spaced = if self.frame_ns.is_none() && since(self.answer_ns) == u64::MAX {
             // Nothing is known yet and an aircraft may be in the air: the first questions go out together.
@@ -372,7 +381,11 @@ impl Link {
             let wanted = if question.once() { !settled[index] } else { true };
             wanted && asked[index].is_none() && (!silent || question == Question::Status)
         })?;
-        let length = write(question, self.version, self.imu, out).ok()?;
+        // One that comes again and is not urgent: no harm where it is not understood.
+        let probe = question == Question::Analog && self.identified() && self.framing.probe(now);
+        let version = if probe { Version::V2 } else { self.framing.version() };
+        let length = write(question, version, self.imu, out).ok()?;
+        self.framing.asked();
         self.schedule.asked(question, now, eager);
         self.schedule.spend(now);
         self.asked_ns[question as usize] = Some(now);
