@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::operate::Order;
+use airframe::controller::Firmware;
 use anyhow::{Result, anyhow, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cli::flight::Begin;
@@ -183,6 +184,13 @@ pub(crate) struct Rehearse {
     /// Carry the drone off by so many metres (0 to 20) once in every flight, without anything on board feeling it.
     #[arg(long, default_value_t = 0.0)]
     pub displaced: f64,
+    /// Which firmware the flight controller plays: betaflight-4.5, betaflight-2025.12, betaflight-2026.12, inav-9.1 or
+    /// flip32; the simulator's configuration says when absent (betaflight-2025.12).
+    #[arg(long, value_name = "NAME")]
+    pub firmware: Option<String>,
+    /// Fly a flight controller without magnetometer: its heading begins anywhere and drifts.
+    #[arg(long)]
+    pub no_magnetometer: bool,
     /// Flights at the same time, 1 to 256; all cores when absent.
     #[arg(long)]
     pub threads: Option<usize>,
@@ -251,6 +259,11 @@ impl Rehearse {
     /// Refuses what cannot be flown, in one sentence.
     pub(crate) fn check(&self, json: bool) -> Result<()> {
         self.method()?;
+        if let Some(name) = &self.firmware
+            && Firmware::by_name(name).is_none()
+        {
+            bail!("--firmware {name} is not known: allowed are {}", Firmware::names());
+        }
         if !(1..=MOST_FLIGHTS).contains(&self.flights) {
             bail!("--flights {} is out of range: allowed is 1..={MOST_FLIGHTS}", self.flights);
         }
@@ -371,6 +384,24 @@ mod tests {
             order.check(json).unwrap();
             assert_eq!(Begin::from(order.start), begin);
         }
+    }
+
+    #[test]
+    fn a_firmware_goes_by_its_name() {
+        for firmware in Firmware::ALL {
+            let (rehearse, _) = rehearsal(&format!("sereno rehearse --firmware {}", firmware.name()));
+            rehearse.check(false).unwrap();
+        }
+        let said = refusal("--seed 1", "--seed 1 --firmware ardupilot");
+        assert!(Firmware::ALL.iter().all(|firmware| said.contains(firmware.name())), "{said}");
+        let (bare, _) = rehearsal("sereno rehearse");
+        assert!(bare.firmware.is_none() && !bare.no_magnetometer);
+        assert!(rehearsal("sereno rehearse --no-magnetometer").0.no_magnetometer);
+        // What the help says is what there is.
+        let mut command = <Arguments as clap::CommandFactory>::command();
+        let rehearse = command.find_subcommand_mut("rehearse").unwrap();
+        let help = rehearse.render_long_help().to_string().replace(['\n', ' '], "");
+        assert!(Firmware::ALL.iter().all(|firmware| help.contains(firmware.name())), "{help}");
     }
 
     #[test]

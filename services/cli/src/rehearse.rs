@@ -39,6 +39,10 @@ fn setup(place: &Place, order: &Rehearse) -> Result<(Setup, Vec<String>)> {
     let mut simulator: simulator::Config = runtime::parse_config(&entry.config, &text)?;
     order.clutter.clone_into(&mut simulator.clutter);
     simulator.displaced_m = order.displaced;
+    if let Some(firmware) = &order.firmware {
+        firmware.clone_into(&mut simulator.firmware);
+    }
+    simulator.magnetometer &= !order.no_magnetometer;
     runtime::Validate::validate(&simulator)?;
     if let Some(speed) = order.speed
         && !(0.1..=1.5).contains(&speed)
@@ -60,6 +64,13 @@ fn setup(place: &Place, order: &Rehearse) -> Result<(Setup, Vec<String>)> {
     let Building { pad, mut remarks } = Building::survey(&start, order.pad)?;
     if navigation.avoid != Method::default() {
         remarks.push(format!("obstacles are avoided by the method \"{}\"", navigation.avoid));
+    }
+    let usual = simulator::Config::default();
+    if simulator.firmware != usual.firmware {
+        remarks.push(format!("the flight controller plays {}", simulator.firmware));
+    }
+    if !simulator.magnetometer {
+        remarks.push("the flight controller has no magnetometer".to_owned());
     }
     manifest.system.pad = Some([pad.x, pad.y, pad.heading_deg]);
     // The manifest's own file otherwise, with its hash in the journal.
