@@ -126,6 +126,14 @@ impl Default for NavigationConfig {
     }
 }
 
+impl NavigationConfig {
+    /// The same, flown at the vehicle's own height where it has one.
+    #[must_use]
+    pub(crate) fn at_height(self, height_m: Option<f32>) -> Self {
+        Self { height_m: height_m.unwrap_or(self.height_m), ..self }
+    }
+}
+
 impl Validate for NavigationConfig {
     fn validate(&self) -> Result<(), ConfigError> {
         let check = |field, value: f32, low, high| within(field, f64::from(value), low..=high);
@@ -162,6 +170,12 @@ mod tests {
         let text = include_str!("../../../deploy/config/navigation.toml");
         let shipped: NavigationConfig = runtime::parse_config("navigation.toml", text).unwrap();
         assert_eq!(shipped, NavigationConfig::default());
+    }
+
+    #[test]
+    fn a_vehicle_that_has_a_height_is_flown_at_it() {
+        assert_eq!(NavigationConfig::default().at_height(Some(0.8)).height_m, 0.8);
+        assert_eq!(NavigationConfig::default().at_height(None), NavigationConfig::default());
     }
 
     #[test]

@@ -58,6 +58,7 @@ impl Service for Navigation {
 
     fn start(config: NavigationConfig, ports: &mut Ports, start: &Start) -> Result<Self, StartError> {
         let vehicle = &start.vehicle;
+        let config = config.at_height(vehicle.limits.height_m);
         let cruise = if config.cruise_m_s > 0.0 { config.cruise_m_s } else { vehicle.limits.cruise_m_s };
         let craft = Craft { radius_m: vehicle.body.radius_m, cruise_m_s: cruise };
         let core = Core::new(config, craft, atlas_of(start)?).map_err(|error| {

@@ -37,6 +37,7 @@ impl Service for Pilot {
     type Config = PilotConfig;
 
     fn start(config: PilotConfig, ports: &mut Ports, start: &Start) -> Result<Self, StartError> {
+        let config = config.at_height(start.vehicle.limits.height_m)?;
         let plan = start.plan()?;
         let walls = start.shared("pilot walls", || Ok(DistanceField::new(&plan, WALLS_M)))?;
         Ok(Self {

@@ -90,6 +90,9 @@ pub struct Limits {
     pub climb_m_s: f32,
     /// Largest descent, m/s.
     pub descend_m_s: f32,
+    /// Height above the floor at which this vehicle is flown, metres: goes before what the configurations of pilot and
+    /// navigation say. `None`: they decide.
+    pub height_m: Option<f32>,
 }
 
 /// A down-looking optical flow sensor with its own range finder (MSP v2 0x1F02 and 0x1F01, FACTS 1).
@@ -185,6 +188,7 @@ struct RawLimits {
     max_tilt_deg: f32,
     climb_m_s: f32,
     descend_m_s: f32,
+    height_m: Option<f32>,
 }
 
 #[derive(Deserialize)]
@@ -288,6 +292,7 @@ impl RawVehicle {
                 max_tilt_rad: self.limits.max_tilt_deg.to_radians(),
                 climb_m_s: self.limits.climb_m_s,
                 descend_m_s: self.limits.descend_m_s,
+                height_m: self.limits.height_m,
             },
             flow: self.flow.map(|f| FlowSensor {
                 rate_hz: f.rate_hz,
@@ -347,6 +352,10 @@ impl Check<'_> {
         self.within("limits.climb_m_s", v.limits.climb_m_s, 0.1, 1.5)?;
         // Touching the floor faster than 0.7 m/s counts as a contact.
         self.within("limits.descend_m_s", v.limits.descend_m_s, 0.1, 0.7)?;
+        if let Some(height_m) = v.limits.height_m {
+            // What navigation's own setting allows; the pilot's ceiling is checked where it is known.
+            self.within("limits.height_m", height_m, 0.5, 2.5)?;
+        }
         if let Some(flow) = &v.flow {
             self.within("flow.rate_hz", flow.rate_hz, 5.0, 200.0)?;
             self.within("flow.count_deg", flow.count_deg, 0.001, 5.0)?;

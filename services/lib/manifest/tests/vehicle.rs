@@ -62,6 +62,9 @@ fn degrees_become_radians_and_defaults_are_filled() {
     let front = v.sonars[0].axis();
     let left = v.sonars[1].axis();
     assert!((front[0] - 1.0).abs() < 1e-6 && (left[1] - 1.0).abs() < 1e-6, "bearing is counter-clockwise");
+    assert_eq!(v.limits.height_m, None, "the configurations decide");
+    let low = GOOD.replace("descend_m_s = 0.3", "descend_m_s = 0.3\nheight_m = 0.8");
+    assert_eq!(Vehicle::parse("v.toml", &low).unwrap().limits.height_m, Some(0.8));
     let sonar_alone = GOOD.replace("[flow]\nrate_hz = 25\nyaw_deg = 90\n", "");
     assert_eq!(Vehicle::parse("v.toml", &sonar_alone).unwrap().flow, None);
 }
@@ -96,6 +99,11 @@ fn absurd_values_are_refused_with_their_range() {
         ("cells = 4", "cells = 0", "battery.cells = 0: allowed is 1 to 8"),
         ("max_tilt_deg = 10", "max_tilt_deg = 80", "limits.max_tilt_deg = 80: allowed is 3 to 25"),
         ("descend_m_s = 0.3", "descend_m_s = inf", "limits.descend_m_s = inf: allowed is 0.1 to 0.7"),
+        (
+            "descend_m_s = 0.3",
+            "descend_m_s = 0.3\nheight_m = 0.2",
+            "limits.height_m = 0.2: allowed is 0.5 to 2.5",
+        ),
         ("x_m = 0.1", "x_m = 1.0", "sonar front: x_m = 1: allowed is -0.225 to 0.225"),
         ("name = \"left\"", "name = \"front\"", "two sonars are called front"),
         ("mass_kg = 1.1", "weight = 1.1", "v.toml:6: unknown field `weight`"),
@@ -133,4 +141,27 @@ fn the_shipped_vehicles_can_be_flown() {
         count += 1;
     }
     assert!(count >= 2, "{count}");
+}
+
+/// FACTS 7, with the thesis's clockwise angles (90 ahead) turned into ours.
+#[test]
+fn the_thesis_vehicle_is_the_one_of_the_thesis() {
+    let text = include_str!("../../../../deploy/vehicles/thesis.toml");
+    let v = Vehicle::parse("thesis.toml", text).unwrap();
+    let around: Vec<f32> =
+        v.sonars.iter().filter(|s| !s.looks_down()).map(|s| 90.0 - s.bearing_rad.to_degrees()).collect();
+    assert_eq!(around.len(), 5);
+    for (bearing, his) in around.iter().zip([0.0f32, 53.0, 90.0, 127.0, 180.0]) {
+        assert!((bearing - his).abs() < 1e-3, "{around:?}");
+    }
+    assert_eq!(v.sonars[0].name, "left", "his 0 degrees are on the left");
+    // One by one: no two share a group, the down sonar has its own.
+    let mut groups: Vec<u32> = v.sonars.iter().map(|s| s.group).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    assert_eq!(groups.len(), 6);
+    assert!(v.sonars.iter().all(|s| (s.min_range_m, s.max_range_m) == (0.05, 3.75)));
+    assert!((v.limits.max_tilt_rad - 8f32.to_radians()).abs() < 1e-6);
+    assert_eq!((v.limits.height_m, v.flow), (Some(0.8), None));
+    assert!((4.0 * v.motors.max_thrust_n / 9.806_65 - 3.8).abs() < 0.02, "kilograms of thrust");
 }
