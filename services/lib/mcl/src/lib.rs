@@ -18,6 +18,8 @@
 //! * **3** (Gaussian of the range error) is the *hit* part of the mixture in [`SonarModel`]: alone it
 //!   lets a single unmapped chair rule out the truth.
 //! * **4** (normalisation) as it stands.
+//!
+//! The thesis's filter as it stands, for comparison, is [`thesis::Filter`].
 #![forbid(unsafe_code)]
 
 mod beams;
@@ -32,6 +34,7 @@ mod particles;
 mod resample;
 mod search;
 mod sonar;
+pub mod thesis;
 mod trust;
 
 pub use config::{Config, ConfigError, PopulationConfig, ResampleConfig, SonarConfig};
