@@ -42,6 +42,7 @@ fn setup(vehicle: &str) -> Setup {
         simulator: simulator::Config { clutter: "full".to_owned(), ..simulator::Config::default() },
         navigation: None,
         begin: cli::flight::Begin::default(),
+        localization: None,
         patience_s: 120.0,
         cache: runtime::Cache::default(),
     }

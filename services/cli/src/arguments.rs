@@ -191,6 +191,10 @@ pub(crate) struct Rehearse {
     /// Fly a flight controller without magnetometer: its heading begins anywhere and drifts.
     #[arg(long)]
     pub no_magnetometer: bool,
+    /// Which particle filter finds the drone: sereno, or thesis, the plain one of the thesis; what the configuration says
+    /// when absent.
+    #[arg(long)]
+    pub filter: Option<localization::FilterKind>,
     /// Flights at the same time, 1 to 256; all cores when absent.
     #[arg(long)]
     pub threads: Option<usize>,
@@ -370,6 +374,17 @@ mod tests {
             let error = Arguments::try_parse_from(["sereno", "rehearse", "--pad", wrong]).unwrap_err();
             assert!(error.to_string().contains("X,Y,DEG"), "{wrong}: {error}");
         }
+    }
+
+    #[test]
+    fn a_filter_is_one_that_there_is() {
+        use localization::FilterKind;
+        assert_eq!(rehearsal("sereno rehearse").0.filter, None);
+        for (word, kind) in [("sereno", FilterKind::Sereno), ("thesis", FilterKind::Thesis)] {
+            assert_eq!(rehearsal(&format!("sereno rehearse --filter {word}")).0.filter, Some(kind));
+        }
+        let error = Arguments::try_parse_from(["sereno", "rehearse", "--filter", "kalman"]).unwrap_err();
+        assert!(error.to_string().contains("allowed is sereno or thesis"), "{error}");
     }
 
     #[test]

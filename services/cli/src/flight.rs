@@ -27,6 +27,8 @@ pub struct Setup {
     pub navigation: Option<NavigationConfig>,
     /// Where the drone starts, and what localization is told of it.
     pub begin: Begin,
+    /// Configuration of localization; that of the manifest's file when absent.
+    pub localization: Option<LocalizationConfig>,
     /// Longest flight, simulated seconds.
     pub patience_s: f64,
     /// Plans and tables shared between flights.
@@ -48,6 +50,7 @@ impl Setup {
             root,
             simulator,
             navigation: None,
+            localization: None,
             begin: Begin::default(),
             patience_s,
             cache: Cache::default(),
@@ -56,7 +59,10 @@ impl Setup {
 
     /// The configuration of localization with what it is told of the start.
     fn told(&self, simulator: &simulator::Config, world: &World, seed: u64) -> Result<LocalizationConfig> {
-        let mut config = self.config::<localization::Localization>()?;
+        let mut config = match &self.localization {
+            Some(config) => config.clone(),
+            None => self.config::<localization::Localization>()?,
+        };
         config.start = StartSection { from: StartFrom::Unknown, ..config.start };
         if self.begin == Begin::Room {
             let seed = Start::service_seed(seed, <simulator::Simulator as runtime::Service>::NAME);
@@ -137,7 +143,10 @@ impl Flight {
         bus.add::<flow::Flow>()?;
         bus.add::<pilot::Pilot>()?;
         if setup.begin == Begin::Pad {
-            bus.add::<localization::Localization>()?;
+            match &setup.localization {
+                Some(config) => bus.add_with::<localization::Localization>(config.clone())?,
+                None => bus.add::<localization::Localization>()?,
+            }
         } else {
             bus.add_with::<localization::Localization>(setup.told(&simulator, &world, seed)?)?;
         }

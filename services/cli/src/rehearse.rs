@@ -7,6 +7,7 @@ use cli::building::Building;
 use cli::flight::{Flight, Setup};
 use cli::place::{Place, vehicle_file};
 use indicatif::{ProgressBar, ProgressStyle};
+use localization::{FilterKind, LocalizationConfig};
 use navigation::config::{Method, NavigationConfig};
 use runtime::{Cache, Start};
 use std::path::{Path, PathBuf};
@@ -59,6 +60,13 @@ fn setup(place: &Place, order: &Rehearse) -> Result<(Setup, Vec<String>)> {
     if let Some(method) = method {
         navigation.avoid = method;
     }
+    let mut localization = None;
+    if let Some(filter) = order.filter {
+        let entry = manifest.services.get("localization").context("the manifest has no localization")?;
+        let text = std::fs::read_to_string(root.join(&entry.config)).with_context(|| entry.config.clone())?;
+        let config: LocalizationConfig = runtime::parse_config(&entry.config, &text)?;
+        localization = Some(LocalizationConfig { filter, ..config });
+    }
     let cache = Cache::default();
     let start = Start::new(manifest.system.clone(), &root, 0, 0, true, cache.clone())?;
     let Building { pad, mut remarks } = Building::survey(&start, order.pad)?;
@@ -72,11 +80,15 @@ fn setup(place: &Place, order: &Rehearse) -> Result<(Setup, Vec<String>)> {
     if !simulator.magnetometer {
         remarks.push("the flight controller has no magnetometer".to_owned());
     }
+    if order.filter == Some(FilterKind::Thesis) {
+        remarks.push("localization by the thesis's plain particle filter".to_owned());
+    }
     manifest.system.pad = Some([pad.x, pad.y, pad.heading_deg]);
     // The manifest's own file otherwise, with its hash in the journal.
     let navigation = (order.speed.is_some() || method.is_some()).then_some(navigation);
     let begin = order.start.into();
-    Ok((Setup { manifest, root, simulator, navigation, begin, patience_s: PATIENCE_S, cache }, remarks))
+    let patience_s = PATIENCE_S;
+    Ok((Setup { manifest, root, simulator, navigation, localization, begin, patience_s, cache }, remarks))
 }
 
 /// A scored flight and how much simulated time it took.

@@ -15,6 +15,7 @@ fn setup(clutter: &str) -> Setup {
         simulator: simulator::Config { clutter: clutter.to_owned(), ..simulator::Config::default() },
         navigation: None,
         begin: cli::flight::Begin::default(),
+        localization: None,
         patience_s: 120.0,
         cache: runtime::Cache::default(),
     }

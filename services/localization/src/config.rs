@@ -2,6 +2,7 @@
 
 use mcl::{Config, MotionConfig, PopulationConfig, ResampleConfig, SonarConfig, TrustConfig};
 use runtime::{ConfigError, Validate, within};
+use std::str::FromStr;
 
 /// Defines a section that mirrors one of the filter's settings structures, so that files can hold it.
 macro_rules! section {
@@ -173,10 +174,35 @@ impl Default for StartSection {
     }
 }
 
+/// Which particle filter follows the drone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FilterKind {
+    /// [`mcl::Filter`].
+    #[default]
+    Sereno,
+    /// The thesis's own, plain: [`mcl::thesis::Filter`].
+    Thesis,
+}
+
+impl FromStr for FilterKind {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "sereno" => Ok(Self::Sereno),
+            "thesis" => Ok(Self::Thesis),
+            _ => Err("allowed is sereno or thesis".to_owned()),
+        }
+    }
+}
+
 /// Settings of the service.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LocalizationConfig {
+    /// Which filter. The thesis's takes no more from below than the bounds of the population and the trust.
+    pub filter: FilterKind,
     /// Poses a second, at most one a step.
     pub pose_hz: f64,
     /// Without a ping for so long the set is moved by tilt and flow alone, seconds.
@@ -200,6 +226,7 @@ pub struct LocalizationConfig {
 impl Default for LocalizationConfig {
     fn default() -> Self {
         Self {
+            filter: FilterKind::default(),
             pose_hz: 50.0,
             silent_s: 0.2,
             max_age_s: 5.0,
@@ -216,7 +243,7 @@ impl Default for LocalizationConfig {
 impl LocalizationConfig {
     /// The filter's part of the settings.
     #[must_use]
-    pub fn filter(&self) -> Config {
+    pub fn filter_config(&self) -> Config {
         Config {
             motion: self.motion.to_filter(),
             sonar: self.sonar.to_filter(),
@@ -262,7 +289,7 @@ impl Validate for LocalizationConfig {
         within("start.sigma_m", f64::from(start.sigma_m), 0.01..=1.0)?;
         within("start.heading_sigma_deg", f64::from(start.heading_sigma_deg), 0.5..=45.0)?;
         within("start.level_sigma_deg", f64::from(start.level_sigma_deg), 0.1..=5.0)?;
-        self.filter()
+        self.filter_config()
             .check()
             .map_err(|e| ConfigError::range(e.field, e.value, format!("{}..={}", e.low, e.high)))
     }

@@ -10,6 +10,7 @@ mod config;
 mod flow;
 mod kalman;
 mod news;
+mod plain;
 mod pose;
 mod predict;
 mod rate;
@@ -22,7 +23,8 @@ mod velocity;
 
 pub use attitude::{Attitudes, Mean};
 pub use config::{
-    LocalizationConfig, MotionSection, PopulationSection, SonarSection, StartFrom, StartSection, TrustSection,
+    FilterKind, LocalizationConfig, MotionSection, PopulationSection, SonarSection, StartFrom, StartSection,
+    TrustSection,
 };
 pub use flow::Flows;
 pub use service::Localization;

@@ -3,17 +3,18 @@
 mod seeking;
 mod update;
 
-use crate::LocalizationConfig;
 use crate::attitude::{Attitudes, seconds};
 use crate::clutter::Clutter;
 use crate::flow::{Flows, Frame};
 use crate::news::News;
+use crate::plain::Plain;
 use crate::pose::{Walls, fill};
 use crate::seek::{Seek, Why};
 use crate::set::{MEMORY_GROUNDED, MEMORY_SEEKING, Set, columns, fold};
 use crate::start::{From, from};
 use crate::sweep::{Group, Waiting};
 use crate::velocity::Velocity;
+use crate::{FilterKind, LocalizationConfig};
 use floorplan::{ConeModel, ConeTable};
 use ipc_types::{
     Attitude, FlowMotion, LocalizationState, MAX_PARTICLES, Particles, PilotState, Pose, SonarRanges, Text,
@@ -44,6 +45,8 @@ pub struct Localization {
 
     config: LocalizationConfig,
     filter: Filter<Arc<ConeTable>>,
+    /// The thesis's filter, when that is to follow the drone instead.
+    plain: Option<Plain>,
     table: Arc<ConeTable>,
     /// The sonars as the velocity looks through them: exactly, and as wide as large things are heard.
     cone: ConeModel,
@@ -101,8 +104,11 @@ impl Service for Localization {
         let table = start.shared(&format!("cone table {} {model:?}", start.system.plan), || {
             ConeTable::new(plan, model).map_err(StartError::invalid)
         })?;
-        let filter =
-            Filter::new(config.filter(), Arc::clone(&table), MAX_PARTICLES).map_err(StartError::invalid)?;
+        let filter = Filter::new(config.filter_config(), Arc::clone(&table), MAX_PARTICLES)
+            .map_err(StartError::invalid)?;
+        let plain = (config.filter == FilterKind::Thesis)
+            .then(|| Plain::new(&config, table.plan()).map_err(StartError::invalid))
+            .transpose()?;
         let clutter = Clutter::new(table.plan(), start.sidecar()?.doors);
         let room = match &begins {
             From::Room { rooms, room } => Some((Arc::clone(rooms), *room)),
@@ -119,6 +125,7 @@ impl Service for Localization {
             particles: ports.output()?,
             config,
             filter,
+            plain,
             table,
             cone: ConeModel { half_angle_rad: WIDE_RAD, sub_rays: WIDE_RAYS, ..model },
             plan: hash,

@@ -8,7 +8,7 @@ use floorplan::{ConeModel, Plan, cast_cone};
 use ipc_types::{
     Attitude, FlowMotion, LocalizationState, PilotState, Pose, SonarRanges, SonarReading, SonarStatus,
 };
-use localization::Localization;
+use localization::{FilterKind, Localization, LocalizationConfig};
 use runtime::{Cache, Input, Lockstep, Output, StartError};
 use std::f32::consts::{FRAC_PI_4, PI};
 
@@ -96,6 +96,10 @@ struct Truth {
 
 impl Bench {
     fn new(sidecar: &str) -> Result<Self, StartError> {
+        Self::with(sidecar, LocalizationConfig::default())
+    }
+
+    fn with(sidecar: &str, config: LocalizationConfig) -> Result<Self, StartError> {
         let rows: Vec<String> = HALL
             .iter()
             .flat_map(|row| {
@@ -129,7 +133,7 @@ impl Bench {
             took_off_ns: u64::MAX,
             _directory: directory,
         };
-        bench.system.add::<Localization>()?;
+        bench.system.add_with::<Localization>(config)?;
         Ok(bench)
     }
 
@@ -363,6 +367,61 @@ fn a_poor_floor_holds_the_set_together() {
     assert!(dim < 0.7 * blind, "{dim} over a poor floor, {blind} over one that shows nothing");
 }
 
+fn thesis() -> LocalizationConfig {
+    LocalizationConfig { filter: FilterKind::Thesis, ..LocalizationConfig::default() }
+}
+
+/// One flight; the bounds leave as much again as was seen (median 9 cm, worst 21 cm).
+#[test]
+fn the_thesis_filter_follows_on_the_same_topics() {
+    let mut bench = Bench::with(PAD, thesis()).unwrap();
+    let (pose, error) = bench.run(1_000).pop().unwrap();
+    assert!(error < 0.03 && pose.state as u8 == LocalizationState::Tracking.code(), "{error}");
+    assert_eq!(pose.particles, 5_000, "on the ground nothing is weighed");
+    assert!((pose.level_roll_rad - LEVEL.0).abs() < 0.003);
+    bench.take_off();
+    bench.run(500);
+    let poses = bench.run(20_000);
+    let mut errors: Vec<f32> = poses.iter().map(|p| p.1).collect();
+    errors.sort_by(f32::total_cmp);
+    assert!(errors[errors.len() / 2] < 0.18, "median {}", errors[errors.len() / 2]);
+    assert!(worst(&poses) < 0.42, "{}", worst(&poses));
+    let last = poses.last().unwrap().0;
+    assert_eq!(last.particles, 1_000, "down by quarters to the least number");
+    assert!(last.walls_in_echo >= 3 && last.p_lost < 0.05, "{} {}", last.walls_in_echo, last.p_lost);
+    let speed = last.velocity_x_m_s.hypot(last.velocity_y_m_s);
+    assert!((speed - SPEED).abs() < 0.15, "a velocity from beside the filter: {speed}");
+    // Killed, it goes on from the set that the keeper holds.
+    bench.system.kill("localization");
+    bench.run(300);
+    bench.system.add_with::<Localization>(thesis()).unwrap();
+    let (pose, error) = bench.run(1_000).pop().unwrap();
+    assert_eq!(pose.particles, 1_000);
+    assert!(error < 0.42, "{error}");
+}
+
+/// Without sonars nothing is weighed, and in the end that is said.
+#[test]
+fn the_thesis_filter_without_sonars_grows_doubtful() {
+    let mut bench = Bench::with(PAD, thesis()).unwrap();
+    bench.run(1_000);
+    bench.take_off();
+    let before = bench.run(5_000).last().unwrap().0;
+    let mut last = before;
+    for _ in 0..20_000 {
+        let next = (bench.system.now() / MS + 1) * MS;
+        bench.system.run_until(next);
+        if ![40, 60].iter().any(|period| (next / MS).is_multiple_of(*period)) {
+            bench.sense(next);
+        }
+        while let Some(pose) = bench.poses.receive() {
+            last = *pose;
+        }
+    }
+    assert!(last.p_lost > before.p_lost.max(0.05), "{} after {}", last.p_lost, before.p_lost);
+    assert_eq!(last.walls_in_echo, 0);
+}
+
 #[test]
 fn nonsense_is_refused_and_changes_nothing() {
     let mut bench = Bench::new(PAD).unwrap();
@@ -407,13 +466,19 @@ fn a_start_without_a_place_is_refused_in_words() {
 #[test]
 fn the_shipped_configuration_is_the_default() {
     let text = include_str!("../../../deploy/config/localization.toml");
-    let config: localization::LocalizationConfig = runtime::parse_config("localization.toml", text).unwrap();
-    assert_eq!(config, localization::LocalizationConfig::default());
-    let error = |text: &str| {
-        runtime::parse_config::<localization::LocalizationConfig>("l.toml", text).unwrap_err().to_string()
-    };
+    let config: LocalizationConfig = runtime::parse_config("localization.toml", text).unwrap();
+    assert_eq!(config, LocalizationConfig::default());
+    let error =
+        |text: &str| runtime::parse_config::<LocalizationConfig>("l.toml", text).unwrap_err().to_string();
     let low = error("[motion]\nvelocity_noise = 0.0");
     assert_eq!(low, "l.toml: motion.velocity_noise = 0 is out of range: allowed is 0.01..=3");
     assert!(error("[start]\nx_m = 1.0").contains("all three"));
     assert!(error("[sonr]\n").contains("sonr"));
+    let unknown = error("filter = \"kalman\"");
+    assert!(
+        unknown.contains("kalman") && unknown.contains("`sereno`") && unknown.contains("`thesis`"),
+        "{unknown}"
+    );
+    let thesis: LocalizationConfig = runtime::parse_config("l.toml", "filter = \"thesis\"").unwrap();
+    assert_eq!(thesis.filter, FilterKind::Thesis);
 }

@@ -3,6 +3,7 @@
 use super::{Believed, Localization};
 use crate::attitude::{Tilt, seconds};
 use crate::clutter::Ear;
+use crate::plain::Flown;
 use crate::predict::{Dynamics, predict};
 use crate::seek::Why;
 use crate::set::{MEMORY_GROUNDED, MEMORY_SEEKING, columns, columns_mut};
@@ -61,7 +62,10 @@ impl Localization {
             p_lost: if self.grounded { 0.01 } else { HOPELESS },
         };
         let mut generator = Generator::new(self.seed);
-        let update = self.filter.start_at(&start, columns_mut(&mut loan), &mut generator);
+        let update = match &mut self.plain {
+            None => self.filter.start_at(&start, columns_mut(&mut loan), &mut generator),
+            Some(plain) => plain.begin(&start, &mut loan, &mut generator),
+        };
         self.believed = Some(self.send(now, now, &update, &generator, loan));
     }
 
@@ -135,14 +139,15 @@ impl Localization {
             news,
         });
         let mut generator = Generator::from_state(set.generator);
-        let update = self.filter.update(
-            columns(set),
-            &memory,
-            &motion,
-            sweep.as_ref(),
-            columns_mut(&mut loan),
-            &mut generator,
-        );
+        let flown = self.plain.as_ref().and_then(|_| self.flown(time_ns));
+        let (sweep, generator_now) = (sweep.as_ref(), &mut generator);
+        let update = match &mut self.plain {
+            None => {
+                let next = columns_mut(&mut loan);
+                self.filter.update(columns(set), &memory, &motion, sweep, next, generator_now)
+            }
+            Some(plain) => plain.update(set, &memory, &motion, flown, sweep, &mut loan, generator_now),
+        };
         if update.count == 0 {
             return;
         }
@@ -199,6 +204,17 @@ impl Localization {
             velocity_x: cos * x + sin * y,
             velocity_y: -sin * x + cos * y,
             sigma: (swept.sigma * (SWEPT_S / dt_s).sqrt()).max(LEAST_SWEPT_M_S),
+        })
+    }
+
+    /// The velocity that is flown by, as a set takes it that has none of its own.
+    fn flown(&self, time_ns: u64) -> Option<Flown> {
+        let b = self.believed?;
+        let p = self.predicted(&b, time_ns, false);
+        Some(Flown {
+            velocity: p.velocity,
+            sigma: p.velocity_sigma,
+            heading_offset: b.estimate.heading_offset,
         })
     }
 
