@@ -275,6 +275,9 @@ impl Validate for LocalizationConfig {
                 "pad, where x_m, y_m and heading_deg are given",
             ));
         }
+        if self.filter == FilterKind::Thesis && start.from != StartFrom::Pad {
+            return Err(ConfigError::range("start.from", "a search", "pad, with filter = \"thesis\""));
+        }
         if start.room.is_empty() == (start.from == StartFrom::Room) {
             return Err(ConfigError::range(
                 "start.room",

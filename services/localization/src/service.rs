@@ -114,7 +114,7 @@ impl Service for Localization {
             From::Room { rooms, room } => Some((Arc::clone(rooms), *room)),
             From::Pad(_) | From::Unknown => None,
         };
-        let seek = Seek::new(lattice, &config.filter().sonar, room);
+        let seek = Seek::new(lattice, &config.filter_config().sonar, room);
         let mut service = Self {
             ranges: ports.input()?,
             attitude: ports.input()?,

@@ -160,7 +160,8 @@ impl Localization {
     /// Looks for another place while the set doubts itself, or has only just been found.
     pub(super) fn watch(&mut self, now: u64, group: &Group, believed: &Believed) {
         let e = &believed.estimate;
-        if self.grounded {
+        // The thesis's filter is flown as it is, to be compared.
+        if self.grounded || self.plain.is_some() {
             self.seek.stop();
             self.elsewhere = 0.0;
             return;
