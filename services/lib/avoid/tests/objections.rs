@@ -1,7 +1,13 @@
 //! The thesis's objections to potential fields (3.1, "Desventajas", after Koren and Borenstein 1991), one test each but for the
 //! cost, which is a bench. `docs/potential-fields.md` says what comes of them. The worlds hold no chance: each flight is one
 //! flight.
-#![allow(clippy::unwrap_used, unreachable_pub, dead_code, reason = "tests, sharing code with an example")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    unreachable_pub,
+    dead_code,
+    reason = "tests, sharing code with an example"
+)]
 
 #[path = "../examples/figures/scenes.rs"]
 mod scenes;

@@ -215,7 +215,7 @@ pub fn look(
 
 /// All rays, if it is their turn.
 fn sweep(world: &World, trial: &Trial, step: usize, (x, y): (f32, f32), window: &Window, cells: &mut [u8]) {
-    if step % trial.sweep_every.max(1) != 0 {
+    if !step.is_multiple_of(trial.sweep_every.max(1)) {
         return;
     }
     let phase = step as f32 * STEP_S / SCAN_S;
