@@ -79,26 +79,28 @@ codes! {
         None = 0 => "none",
         /// Navigation fell silent.
         NavigationSilent = 1 => "navigation silent",
+        /// Who held the sticks fell silent.
+        OperatorSilent = 2 => "operator silent",
         /// A side sonar is silent; its sectors are closed.
-        SideSonarSilent = 2 => "a side sonar is silent",
+        SideSonarSilent = 3 => "a side sonar is silent",
         /// The pose is stale, or P(lost) or sigma too large.
-        PoseUncertain = 3 => "position uncertain",
+        PoseUncertain = 4 => "position uncertain",
         /// All side sonars are silent.
-        AllSonarsSilent = 4 => "all side sonars are silent",
+        AllSonarsSilent = 5 => "all side sonars are silent",
         /// The way home is just covered, or 3.5 V a cell for 10 s.
-        BatteryReturn = 5 => "battery: return",
+        BatteryReturn = 6 => "battery: return",
         /// 3.3 V a cell for 2 s.
-        BatteryLand = 6 => "battery: land",
+        BatteryLand = 7 => "battery: land",
         /// The pose stayed uncertain for 20 s, or fewer than two walls answer.
-        Lost = 7 => "lost",
+        Lost = 8 => "lost",
         /// The down sonar is silent.
-        HeightUnknown = 8 => "height unknown",
+        HeightUnknown = 9 => "height unknown",
         /// The flight controller's link is down.
-        LinkDown = 9 => "flight controller silent",
+        LinkDown = 10 => "flight controller silent",
         /// Tilt over 60 degrees for 0.3 s.
-        Tilt = 10 => "tilted over",
+        Tilt = 11 => "tilted over",
         /// The operator ordered it.
-        Operator = 11 => "operator",
+        Operator = 12 => "operator",
     }
 }
 
@@ -135,15 +137,16 @@ message! {
         pub command_sequence: u32,
         /// A [`Phase`] code.
         pub phase: u8,
-        /// A [`FailsafeCause`] code: the one that acts.
+        /// A [`FailsafeCause`] code: the one that acts. It may have gone when only the ground ends what it began.
         pub cause: u8,
         /// A [`FailsafeAction`] code.
         pub action: u8,
-        /// A [`FailsafeAction`] code: what would happen if the pose were lost now.
+        /// A [`FailsafeAction`] code: what would be done in the end if the pose were lost now for good, all else being
+        /// as it is. So are the others.
         pub if_pose_lost: u8,
-        /// A [`FailsafeAction`] code: what would happen if the operator's link were lost now.
+        /// If the link of who holds the sticks were lost.
         pub if_operator_lost: u8,
-        /// A [`FailsafeAction`] code: what would happen if the down sonar were lost now.
+        /// If the down sonar were lost.
         pub if_height_lost: u8,
         /// 1 while the skids are believed to be on the ground.
         pub on_ground: u8,
@@ -175,8 +178,14 @@ message! {
         pub shield_speed_m_s: f32,
         /// An [`crate::Answer`] code: what became of the last command.
         pub answer: u32,
-        /// Always zero.
-        pub reserved: u32,
+        /// If all side sonars were lost.
+        pub if_sonars_lost: u8,
+        /// If navigation were lost.
+        pub if_navigation_lost: u8,
+        /// If the flight controller were lost.
+        pub if_controller_lost: u8,
+        /// If what is known of the battery were lost.
+        pub if_charge_lost: u8,
         /// The answer in one sentence.
         pub answer_text: Text<96>,
         /// Who holds the sticks; empty for nobody.

@@ -2,7 +2,7 @@
 
 use crate::core::PilotCore;
 use crate::senses::age_s;
-use control::{Action, SpoolUp};
+use control::{Action, Cause, SpoolUp};
 use core::fmt::Write;
 use ipc_types::{Answer, Command, LinkState, Phase, PilotState, Text, Verb};
 
@@ -74,7 +74,8 @@ impl PilotCore {
     }
 
     fn obey(&mut self, now: u64, verb: Verb) -> Ruling {
-        let returning = self.airborne() && self.judged.action == Action::Return;
+        let returning = self.airborne()
+            && (self.judged.action, self.judged.cause) == (Action::Return, Cause::BatteryReturn);
         match (verb, self.phase) {
             (_, Phase::Cut) => refused("refused: the motors were cut"),
             // The table's answer is more severe than these wishes; to come down at once remains free.
@@ -197,6 +198,8 @@ impl PilotCore {
             out.write_str("refused: the localization is silent")
         } else if !self.place_known() && !self.searching() {
             out.write_str("refused: the drone does not know where it is")
+        } else if self.judged.no_arming != Cause::None {
+            write!(out, "refused: a failsafe holds: {}", self.judged.no_arming.words())
         } else {
             return false;
         };

@@ -5,8 +5,8 @@ use crate::config::PilotConfig;
 use crate::ground::Below;
 use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, age_s};
 use control::{
-    ClimbController, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp, Tilt, TouchDown,
-    Vector, VelocityController, WayHome, wrap_angle,
+    ClimbController, Failsafe, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp, Stage,
+    Tilt, TouchDown, Vector, VelocityController, WayHome, wrap_angle,
 };
 use floorplan::{DistanceField, Plan};
 use ipc_types::{ChannelSource, Phase, Text};
@@ -77,24 +77,6 @@ pub(crate) struct GroundLevel {
     pub(crate) seen: u32,
 }
 
-/// Timers of the failsafe table.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Timers {
-    pub(crate) navigation: Held,
-    pub(crate) side: Held,
-    pub(crate) all_sides: Held,
-    pub(crate) pose: Held,
-    pub(crate) searching: Held,
-    pub(crate) walls: Held,
-    pub(crate) home: Held,
-    pub(crate) charge: Held,
-    pub(crate) low: Held,
-    pub(crate) empty: Held,
-    pub(crate) link: Held,
-    pub(crate) tilt: Held,
-    pub(crate) disarmed: Held,
-}
-
 /// What was decided in the last step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Decided {
@@ -163,9 +145,11 @@ pub struct PilotCore {
     pub(crate) blind_since_ns: Option<u64>,
     pub(crate) aside_s: f32,
 
-    pub(crate) timers: Timers,
+    /// For how long the controller has said that it is disarmed.
+    pub(crate) disarmed: Held,
+    pub(crate) failsafe: Failsafe,
+    /// What the failsafe table said in the last step.
     pub(crate) judged: Judgement,
-    pub(crate) failsafe_since_ns: u64,
     pub(crate) decided: Decided,
     pub(crate) last_step_ns: Option<u64>,
     pub(crate) heard: Heard,
@@ -217,9 +201,9 @@ impl PilotCore {
             operator_land: false,
             blind_since_ns: None,
             aside_s: 0.0,
-            timers: Timers::default(),
-            judged: Judgement { causes: 0, cause: control::Cause::None, action: control::Action::None },
-            failsafe_since_ns: 0,
+            disarmed: Held::default(),
+            failsafe: Failsafe::default(),
+            judged: Judgement::NOTHING,
             decided: Decided::NEUTRAL,
             last_step_ns: None,
             heard: Heard::default(),
@@ -282,16 +266,9 @@ impl PilotCore {
         let policy = &self.config.failsafe;
         let now = self.last_step_ns.unwrap_or(0);
         self.pose.state == ipc_types::LocalizationState::Tracking
-            && !self.pose.searching
             && age_s(self.pose.at, now) <= policy.pose_stale_s
             && self.pose.p_lost <= policy.p_lost
             && self.pose.sigma_m <= policy.sigma_m
-    }
-
-    /// Whether localization searches the plan for a drone of which nothing was known.
-    pub(crate) fn searching(&self) -> bool {
-        let now = self.last_step_ns.unwrap_or(0);
-        self.pose.searching && age_s(self.pose.at, now) <= self.config.failsafe.pose_stale_s
     }
 
     /// The phase of the flight.
@@ -303,12 +280,18 @@ impl PilotCore {
     /// Whether the skids are believed to be off the ground.
     #[must_use]
     pub fn airborne(&self) -> bool {
+        self.stage().in_the_air()
+    }
+
+    /// The phase as the failsafe table sees it.
+    pub(crate) fn stage(&self) -> Stage {
         match self.phase {
-            Phase::Grounded | Phase::Arming | Phase::Cut => false,
-            Phase::TakeOff => self.spool.is_none(),
-            Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing | Phase::EmergencyLanding => {
-                true
-            }
+            Phase::Grounded => Stage::Grounded,
+            Phase::Arming | Phase::Cut => Stage::Armed,
+            Phase::TakeOff if self.spool.is_some() => Stage::Armed,
+            Phase::TakeOff | Phase::Hover | Phase::Landing | Phase::EmergencyLanding => Stage::Airborne,
+            Phase::Autonomous => Stage::Autonomous,
+            Phase::Manual => Stage::Manual,
         }
     }
 

@@ -28,7 +28,7 @@ impl PilotCore {
             && age_s(self.flight.at, now) < 1.0
             && self.flight.link == LinkState::Up
             && !self.flight.armed;
-        let disarmed_s = self.timers.disarmed.update(now, says_disarmed, 0.0);
+        let disarmed_s = self.disarmed.update(now, says_disarmed, 0.0);
         let flies = !matches!(self.phase, Phase::Grounded | Phase::Arming | Phase::Cut);
         if flies && disarmed_s >= DISARMED_S && self.phase_s(now) >= DISARMED_S {
             self.stand(now, "the controller disarmed by itself");

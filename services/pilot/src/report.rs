@@ -1,7 +1,7 @@
 //! What the pilot says: channels and state.
 
 use crate::core::PilotCore;
-use control::{Action, Cause, stick};
+use control::{Action, Cause, Loss, stick};
 use ipc_types::{Channels, FailsafeAction, FailsafeCause, Phase, PilotState, nanoseconds};
 
 /// Channels that are filled: four sticks, AUX1 (arm), AUX2 (angle).
@@ -24,6 +24,7 @@ pub(crate) fn cause(cause: Cause) -> FailsafeCause {
     match cause {
         Cause::None => FailsafeCause::None,
         Cause::NavigationSilent => FailsafeCause::NavigationSilent,
+        Cause::OperatorSilent => FailsafeCause::OperatorSilent,
         Cause::SideSonarSilent => FailsafeCause::SideSonarSilent,
         Cause::PoseUncertain => FailsafeCause::PoseUncertain,
         Cause::AllSonarsSilent => FailsafeCause::AllSonarsSilent,
@@ -35,6 +36,16 @@ pub(crate) fn cause(cause: Cause) -> FailsafeCause {
         Cause::Tilt => FailsafeCause::Tilt,
         Cause::Operator => FailsafeCause::Operator,
     }
+}
+
+/// The table's word for a message's action; none for what no version writes.
+pub(crate) fn action_of(code: u8) -> Action {
+    Action::ALL.iter().copied().find(|a| action(*a).code() == code).unwrap_or(Action::None)
+}
+
+/// The table's word for a message's cause; none for what no version writes.
+pub(crate) fn cause_of(code: u8) -> Cause {
+    Cause::ALL.iter().copied().find(|c| cause(*c).code() == code).unwrap_or(Cause::None)
 }
 
 impl PilotCore {
@@ -73,22 +84,24 @@ impl PilotCore {
     /// Writes the state, every field but the header.
     pub fn write_state(&self, out: &mut PilotState) {
         let nowhere = f32::NAN;
-        let policy = &self.config.failsafe;
+        let if_lost = |loss| action(self.failsafe.if_lost(loss, &self.config.failsafe)).code();
         out.phase_since_ns = self.phase_since_ns;
-        out.failsafe_since_ns = self.failsafe_since_ns;
+        out.failsafe_since_ns = self.failsafe.since_ns();
         out.causes = self.judged.causes;
         out.command_ns = self.heard.stamp_ns;
         out.command_sequence = self.heard.sequence;
         out.answer = u32::from(self.heard.answer.code());
         out.answer_text = self.heard.text;
-        out.reserved = 0;
         out.phase = self.phase.code();
         out.cause = cause(self.judged.cause).code();
         out.action = action(self.judged.action).code();
-        out.if_pose_lost = action(self.what_if(|e| e.pose_uncertain_s = policy.pose_hover_s)).code();
-        // No operator holds the sticks: his link carries nothing that flies the drone.
-        out.if_operator_lost = FailsafeAction::None.code();
-        out.if_height_lost = action(self.what_if(|e| e.height_silent_s = policy.height_descend_s)).code();
+        out.if_pose_lost = if_lost(Loss::Pose);
+        out.if_operator_lost = if_lost(Loss::OperatorLink);
+        out.if_height_lost = if_lost(Loss::Height);
+        out.if_sonars_lost = if_lost(Loss::SideSonars);
+        out.if_navigation_lost = if_lost(Loss::Navigation);
+        out.if_controller_lost = if_lost(Loss::Controller);
+        out.if_charge_lost = if_lost(Loss::Charge);
         out.on_ground = u8::from(!self.airborne());
         out.arm = u8::from(self.decided.arm);
         out.hover_throttle_us = if self.hover_known { self.holding_us() } else { nowhere };
@@ -139,24 +152,16 @@ mod tests {
     #[test]
     fn the_codes_of_messages_and_table_agree() {
         for &a in Action::ALL {
-            assert_eq!(action(a).code(), a as u8);
+            assert_eq!((action(a).code(), action(a).word()), (a as u8, a.word()));
         }
-        for (code, c) in [
-            (0, Cause::None),
-            (1, Cause::NavigationSilent),
-            (2, Cause::SideSonarSilent),
-            (3, Cause::PoseUncertain),
-            (4, Cause::AllSonarsSilent),
-            (5, Cause::BatteryReturn),
-            (6, Cause::BatteryLand),
-            (7, Cause::Lost),
-            (8, Cause::HeightUnknown),
-            (9, Cause::LinkDown),
-            (10, Cause::Tilt),
-            (11, Cause::Operator),
-        ] {
-            assert_eq!(cause(c).code(), code);
+        assert_eq!(Action::ALL.len(), FailsafeAction::ALL.len());
+        for (code, &c) in Cause::ALL.iter().enumerate() {
+            assert_eq!((usize::from(cause(c).code()), cause(c).word()), (code, c.words()));
             assert_eq!(c.bit(), 1 << code);
+            assert_eq!(cause_of(c as u8), c);
         }
+        assert_eq!(Cause::ALL.len(), FailsafeCause::ALL.len());
+        assert_eq!(cause_of(200), Cause::None);
+        assert_eq!((action_of(Action::Cut as u8), action_of(200)), (Action::Cut, Action::None));
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::command::Heard;
 use crate::core::PilotCore;
-use control::{SpoolUp, Tilt, Vector, stick};
+use crate::report::{action_of, cause_of};
+use control::{Cause, Failsafe, SpoolUp, Tilt, Vector, stick};
 use ipc_types::{Phase, PilotState};
 
 /// A climb is reckoned on for at most so long, seconds: a restart takes a tenth of it.
@@ -20,7 +21,16 @@ impl PilotCore {
         if (1120.0..=1800.0).contains(&state.hover_throttle_us) {
             self.climb.set_hover(state.hover_throttle_us);
         }
-        if phase == Phase::Grounded || state.arm == 0 {
+        if phase == Phase::Grounded || (state.arm == 0 && phase != Phase::Cut) {
+            return;
+        }
+        // What only the ground ends is not called back by a restart.
+        let (cause, action) = (cause_of(state.cause), action_of(state.action));
+        self.failsafe = Failsafe::resumed(cause, action, state.failsafe_since_ns.min(now));
+        self.judged = self.failsafe.judged();
+        if phase == Phase::Cut {
+            self.enter(now, phase);
+            self.say("motors cut: tilted over");
             return;
         }
         let trim = |us: f32| if us.is_finite() { stick::angle_of(us).clamp(-0.087, 0.087) } else { 0.0 };
@@ -28,7 +38,7 @@ impl PilotCore {
         self.velocity.set_learned(Vector::new(state.disturbance_x_m_s2, state.disturbance_y_m_s2));
         self.hold_heading = state.hold_heading_rad.is_finite().then_some(state.hold_heading_rad);
         self.hold = Vector::new(state.hold_x_m, state.hold_y_m).known();
-        self.operator_land = state.cause == ipc_types::FailsafeCause::Operator.code();
+        self.operator_land = cause == Cause::Operator;
         self.last_step_ns = Some(now);
         // It went on climbing meanwhile.
         let age_s = ipc_types::seconds_between(state.header.stamp_ns, now).clamp(0.0, LONGEST_AWAY_S) as f32;

@@ -32,7 +32,10 @@ pub use arbitration::{Asking, Source, arbitrate};
 pub use braking::Braking;
 pub use check::RangeError;
 pub use climb::{ClimbConfig, ClimbController, VerticalWish};
-pub use failsafe::{Action, Cause, Evidence, Judgement, Policy, Row, judge, table};
+pub use failsafe::{
+    Action, Cause, Clears, Condition, Evidence, Failsafe, Flags, Judgement, Loss, Memory, OperatorLost,
+    Policy, Row, Stage, TABLE, TakeOver, judge, page as failsafe_page,
+};
 pub use heading::{HeadingConfig, yaw_rate};
 pub use height::{Echo as HeightEcho, HeightConfig, HeightEstimator};
 pub use held::Held;
