@@ -111,18 +111,6 @@ impl Default for LandingConfig {
     }
 }
 
-impl PilotConfig {
-    /// The same, flown at the vehicle's own height where it has one.
-    ///
-    /// # Errors
-    /// The vehicle wants to be flown higher than is ever flown here.
-    pub(crate) fn at_height(self, height_m: Option<f32>) -> Result<Self, ConfigError> {
-        let Some(height_m) = height_m else { return Ok(self) };
-        within("the vehicle's limits.height_m", f64::from(height_m), 0.5..=f64::from(self.max_height_m))?;
-        Ok(Self { height_m, ..self })
-    }
-}
-
 /// A range error of the control library as the runtime reports it.
 fn named(error: &RangeError) -> ConfigError {
     ConfigError::range(error.field, error.value, format!("{}..={}", error.low, error.high))
@@ -175,11 +163,41 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_that_has_a_height_is_flown_at_it_under_the_ceiling() {
-        assert_eq!(PilotConfig::default().at_height(Some(0.8)).unwrap().height_m, 0.8);
-        assert_eq!(PilotConfig::default().at_height(None).unwrap(), PilotConfig::default());
-        let error = PilotConfig::default().at_height(Some(2.0)).unwrap_err().to_string();
-        assert!(error.contains("limits.height_m = 2") && error.contains("0.5..=1.6"), "{error}");
+    fn each_time_of_the_failsafe_table_is_the_key_that_it_names() {
+        let usual = PilotConfig::default().failsafe;
+        let set = |key: &str, seconds: f32| {
+            parse_config::<PilotConfig>("pilot.toml", &format!("[failsafe]\n{key} = {seconds:?}"))
+                .unwrap()
+                .failsafe
+        };
+        let mut moved = 0;
+        for row in control::TABLE.iter().filter(|row| !row.after.key.is_empty()) {
+            let seconds = 1.05 * (row.after.seconds)(&usual);
+            assert_eq!((row.after.seconds)(&set(row.after.key, seconds)), seconds, "{}", row.after.key);
+            moved += 1;
+        }
+        for condition in control::Condition::ALL {
+            if let Some((seconds, key)) = condition.clear(&usual) {
+                assert_eq!(condition.clear(&set(key, 1.05 * seconds)), Some((1.05 * seconds, key)));
+                moved += 1;
+            }
+        }
+        assert!(moved > 30, "{moved}");
+    }
+
+    #[test]
+    fn what_is_done_of_a_lost_operator_is_one_of_three_words() {
+        for lost in [control::OperatorLost::Hold, control::OperatorLost::Return, control::OperatorLost::Land]
+        {
+            let text = format!("[failsafe]\noperator_lost = \"{}\"", lost.word());
+            assert_eq!(
+                parse_config::<PilotConfig>("pilot.toml", &text).unwrap().failsafe.operator_lost,
+                lost
+            );
+        }
+        let error =
+            parse_config::<PilotConfig>("pilot.toml", "[failsafe]\noperator_lost = \"hope\"").unwrap_err();
+        assert!(error.to_string().contains("hold"), "{error}");
     }
 
     #[test]

@@ -4,6 +4,7 @@
 mod below;
 mod expiry;
 mod home;
+mod kept;
 mod rig;
 mod sense;
 

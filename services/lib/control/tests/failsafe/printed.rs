@@ -54,5 +54,8 @@ fn no_two_words_are_the_same() {
     differ(Loss::ALL.iter().map(|loss| loss.words()), 7);
     differ([TakeOver::Yes, TakeOver::AfterStop, TakeOver::No].iter().map(|rule| rule.words()), 3);
     differ([OperatorLost::Hold, OperatorLost::Return, OperatorLost::Land].iter().map(|lost| lost.word()), 3);
-    assert!(Stage::ALL.iter().filter(|stage| stage.in_the_air()).count() == 3);
+    assert_eq!(Stage::ALL.iter().filter(|stage| stage.in_the_air()).count(), 3);
+    for (code, cause) in Cause::ALL.iter().enumerate() {
+        assert_eq!(cause.bit(), 1 << code, "{cause:?}");
+    }
 }
