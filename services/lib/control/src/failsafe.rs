@@ -208,10 +208,7 @@ impl Judgement {
     };
 
     fn weigh(&mut self, row: &Row, action: Action) {
-        if (action, row.cause) > (self.action, self.cause) {
-            self.action = action;
-            self.cause = row.cause;
-        }
+        (self.action, self.cause) = (self.action, self.cause).max((action, row.cause));
         self.take_over = self.take_over.max(row.take_over);
         self.lease_over |= row.take_over != TakeOver::Yes || row.only.is_some();
     }
@@ -228,10 +225,9 @@ pub struct Memory {
     kept: u32,
     /// Rows that a human has overruled by taking the sticks while they acted.
     overruled: u32,
-    /// A human holds the sticks rightly.
-    manual: bool,
-    /// Something acted that lets no human take them, or one holds them against it.
-    locked_out: bool,
+    /// Whoever holds the sticks next overrules nothing: something acted that lets no human take them, or somebody has
+    /// held them before.
+    shut: bool,
 }
 
 impl Memory {
@@ -264,10 +260,9 @@ impl Memory {
 pub fn judge(evidence: &Evidence, memory: &Memory, policy: &Policy) -> (Judgement, Memory) {
     let stage = evidence.stage;
     let manual = stage == Stage::Manual;
-    // Who takes them all the same overrules nothing until he has let go.
-    let taken_now = manual && !memory.manual && !memory.locked_out;
+    let taken_now = manual && !memory.shut;
     let mut judged = Judgement::NOTHING;
-    let mut next = Memory { manual: manual && (memory.manual || taken_now), ..Memory::default() };
+    let mut next = Memory::default();
     for (index, row) in TABLE.iter().enumerate() {
         let bit = 1 << index;
         let holds = row.holds(evidence, policy);
@@ -298,6 +293,6 @@ pub fn judge(evidence: &Evidence, memory: &Memory, policy: &Policy) -> (Judgemen
             next.kept |= bit;
         }
     }
-    next.locked_out = judged.take_over == TakeOver::No || (manual && !next.manual);
+    next.shut = manual || judged.take_over == TakeOver::No;
     (judged, next)
 }

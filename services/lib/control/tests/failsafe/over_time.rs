@@ -223,6 +223,17 @@ fn a_human_ends_a_landing_only_where_the_table_lets_him() {
         let let_go = flight.enter(Stage::Airborne);
         assert_eq!(let_go.action == Action::None, free, "{condition:?}: nothing resumes by itself");
     }
+    // Who takes the sticks although something locks him out ends nothing, until he has let go of them.
+    let mut flight = Flight::new(Stage::Airborne);
+    flight.tell(Condition::PoseUncertain, true).run(21.0);
+    flight.tell(Condition::PoseUncertain, false).run(1.0);
+    let shut = flight.tell(Condition::AllSonarsSilent, true).run(1.0);
+    assert_eq!((shut.action, shut.take_over), (Action::Land, TakeOver::No));
+    assert_eq!(flight.enter(Stage::Manual).action, Action::Land);
+    let held = flight.tell(Condition::AllSonarsSilent, false).run(1.0);
+    assert_eq!((held.action, held.take_over), (Action::Land, TakeOver::AfterStop));
+    flight.enter(Stage::Airborne);
+    assert_eq!(flight.enter(Stage::Manual).action, Action::None);
     // What begins while he flies is kept like any other.
     let mut flight = Flight::new(Stage::Manual);
     flight.run(1.0);
