@@ -26,6 +26,8 @@ const FAIRLY_SURE: f32 = 0.9;
 /// seconds, agreed on it and were fairly sure: on the same spot the next search hears the same furniture and the same people.
 const AGREED_M: f32 = 1.0;
 const AGREED_S: f64 = 6.0;
+/// The same for a set that has lost its place, seconds: it knows its heading, and the failsafe brings it down after 20.
+const AGREED_LOST_S: f64 = 3.0;
 /// A check needs so many readings.
 const CHECK_READINGS: usize = 60;
 /// And of which the place explains so much of what was heard: among clutter and behind a door that is shut the true one
@@ -234,7 +236,8 @@ impl Seek {
         }
         self.last = Some(answer);
         let flown = way_m - answer.agreed_m >= AGREED_M;
-        let waited = seconds(answer.agreed_ns, now) >= AGREED_S;
+        let wait_s = if self.why == Some(Why::Lost) { AGREED_LOST_S } else { AGREED_S };
+        let waited = seconds(answer.agreed_ns, now) >= wait_s;
         let confirms = suspect.is_some_and(|(sx, sy, _)| (x - sx).hypot(y - sy) < NEAR_M);
         let sure = match self.why {
             Some(Why::Check | Why::Audit) if confirms => share >= SURE,

@@ -111,6 +111,18 @@ impl Default for LandingConfig {
     }
 }
 
+impl PilotConfig {
+    /// The same, flown at the vehicle's own height where it has one.
+    ///
+    /// # Errors
+    /// The vehicle wants to be flown higher than is ever flown here.
+    pub(crate) fn at_height(self, height_m: Option<f32>) -> Result<Self, ConfigError> {
+        let Some(height_m) = height_m else { return Ok(self) };
+        within("the vehicle's limits.height_m", f64::from(height_m), 0.5..=f64::from(self.max_height_m))?;
+        Ok(Self { height_m, ..self })
+    }
+}
+
 /// A range error of the control library as the runtime reports it.
 fn named(error: &RangeError) -> ConfigError {
     ConfigError::range(error.field, error.value, format!("{}..={}", error.low, error.high))
@@ -160,6 +172,14 @@ mod tests {
         let text = include_str!("../../../deploy/config/pilot.toml");
         let shipped: PilotConfig = parse_config("pilot.toml", text).unwrap();
         assert_eq!(shipped, PilotConfig::default());
+    }
+
+    #[test]
+    fn a_vehicle_that_has_a_height_is_flown_at_it_under_the_ceiling() {
+        assert_eq!(PilotConfig::default().at_height(Some(0.8)).unwrap().height_m, 0.8);
+        assert_eq!(PilotConfig::default().at_height(None).unwrap(), PilotConfig::default());
+        let error = PilotConfig::default().at_height(Some(2.0)).unwrap_err().to_string();
+        assert!(error.contains("limits.height_m = 2") && error.contains("0.5..=1.6"), "{error}");
     }
 
     #[test]

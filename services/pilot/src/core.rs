@@ -266,9 +266,16 @@ impl PilotCore {
         let policy = &self.config.failsafe;
         let now = self.last_step_ns.unwrap_or(0);
         self.pose.state == ipc_types::LocalizationState::Tracking
+            && !self.pose.searching
             && age_s(self.pose.at, now) <= policy.pose_stale_s
             && self.pose.p_lost <= policy.p_lost
             && self.pose.sigma_m <= policy.sigma_m
+    }
+
+    /// Whether localization searches the plan for a drone of which nothing was known.
+    pub(crate) fn searching(&self) -> bool {
+        let now = self.last_step_ns.unwrap_or(0);
+        self.pose.searching && age_s(self.pose.at, now) <= self.config.failsafe.pose_stale_s
     }
 
     /// The phase of the flight.

@@ -5,6 +5,8 @@ use crate::senses::age_s;
 use control::{Condition, Flags};
 use ipc_types::{LinkState, Phase};
 
+/// A velocity that is less certain is not known, m/s: a hover drifts through a room in ten seconds.
+const DRIFTS_M_S: f32 = 0.25;
 /// Share of the capacity that is never counted on: the last tenth is where a pack collapses.
 const USABLE: f32 = 0.9;
 /// Mean speed of a way home, as a share of cruise: doors, corners and braking.
@@ -34,7 +36,10 @@ impl PilotCore {
         let cell = self.cell_volts(now);
         let (silent, sides) = self.shield.silent(now);
         let place_known = self.place_known();
-        let adrift = self.pose.adrift.filter(|_| !place_known);
+        let searching = self.searching();
+        // Who searches has no place to be held by: it is adrift when its velocity is no longer known.
+        let held = searching && self.pose.velocity_sigma < DRIFTS_M_S;
+        let adrift = self.pose.adrift.filter(|_| !place_known && !held);
         let adrift_s = adrift.map_or(0.0, |since| age_s(Some(since), now));
         let height_silent_s = if airborne { self.height.silent_s(now) } else { 0.0 };
         let linked = self.flight.link == LinkState::Up && age_s(self.flight.at, now) <= policy.link_stale_s;
@@ -45,7 +50,8 @@ impl PilotCore {
         flags.set(Condition::OperatorSilent, self.phase == Phase::Manual);
         flags.set(Condition::SideSonarSilent, silent > 0);
         flags.set(Condition::AllSonarsSilent, sides > 0 && silent == sides);
-        flags.set(Condition::PoseUncertain, !place_known);
+        flags.set(Condition::PoseUncertain, !place_known && !searching);
+        flags.set(Condition::Searching, searching && airborne);
         // Walls hold a hover that flow does not.
         flags.set(Condition::FewWalls, adrift.is_some() && self.pose.walls < 2);
         flags.set_lasted(Condition::Adrift, adrift_s);
@@ -77,7 +83,13 @@ impl PilotCore {
         }
         let drawn = self.flight.drawn_mah;
         let fresh = age_s(self.flight.power_at, now) <= self.config.failsafe.power_stale_s;
-        let length = self.home_m.filter(|_| fresh && drawn.is_finite())?;
+        let length = if self.searching() {
+            // It may be anywhere.
+            self.way_home.as_ref().and_then(control::WayHome::longest_m)
+        } else {
+            self.home_m
+        };
+        let length = length.filter(|_| fresh && drawn.is_finite())?;
         let measured = self.flight.amps > 0.5;
         let amps = if measured { self.flight.amps } else { self.craft.capacity_mah * 1e-3 / HOVER_HOURS };
         let seconds = length / (HOME_PACE * self.craft.cruise_m_s).max(0.05) + MEETING_S + LANDING_S;

@@ -32,10 +32,10 @@ const AIR_S: f32 = 1.0;
 const FASTEST: f32 = 1.2;
 /// A velocity is reckoned on by tilt alone for so long, seconds.
 const RECKON_S: f32 = 1.5;
-/// To and fro by so much, radians, once in so many seconds: the sonars look 45 degrees apart, and a turn of 18 degrees a
-/// second is heard and measured as well as none.
+/// To and fro by so much, radians, once in so many seconds: the sonars look 45 degrees apart, all around is heard in five
+/// seconds, and a turn of 28 degrees a second moves no cone by a third of its width between two pings.
 const LOOK_RAD: f32 = 0.785;
-const LOOK_S: f32 = 16.0;
+const LOOK_S: f32 = 10.0;
 /// Growth and fall of the wished height, m/s.
 const HEIGHT_SLEW_M_S: f32 = 0.3;
 

@@ -313,7 +313,7 @@ proptest! {
         let (mut old, mut new) = (Set::new(100), Set::new(100));
         let start = Start {
             x: 2.0, y: 1.5, sigma: 0.2, heading_offset: 0.0, heading_sigma: 0.1,
-            level_roll: 0.0, level_pitch: 0.0, level_sigma: 0.01, p_lost: 0.01,
+            level_roll: 0.0, level_pitch: 0.0, level_sigma: 0.01, velocity: [0.0; 2], p_lost: 0.01,
         };
         let mut generator = Generator::new(2);
         let begun = filter.start_around(&start, 100, old.write(), &mut generator);

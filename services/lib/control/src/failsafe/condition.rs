@@ -36,10 +36,12 @@ pub enum Condition {
     TiltedOver = 13,
     /// The operator's standing order to land.
     LandOrdered = 14,
+    /// Localization searches the plan for a drone of which nothing was known.
+    Searching = 15,
 }
 
 /// How many conditions there are.
-const COUNT: usize = 15;
+const COUNT: usize = 16;
 
 impl Condition {
     /// All, in the order of their numbers.
@@ -59,6 +61,7 @@ impl Condition {
         Self::LinkSilent,
         Self::TiltedOver,
         Self::LandOrdered,
+        Self::Searching,
     ];
 
     /// Whether it means anything in this stage of the flight.
@@ -76,6 +79,7 @@ impl Condition {
             | Self::PoseUncertain
             | Self::FewWalls
             | Self::ChargeUnknown
+            | Self::Searching
             | Self::CellEmpty => Some((policy.clear_s, "clear_s")),
             Self::HomeUncovered | Self::CellLow => Some((policy.battery_clear_s, "battery_clear_s")),
             Self::LinkSilent => Some((policy.link_clear_s, "link_clear_s")),

@@ -43,6 +43,10 @@ fn words(condition: Condition, p: &Policy) -> String {
             p.link_stale_s
         ),
         Condition::TiltedOver => format!("tilt over {} degrees (`tilt_deg`)", p.tilt_deg),
+        Condition::Searching => {
+            "in the air, and the plan is being searched for the place; a hover or a search move is flown"
+                .into()
+        }
         Condition::LandOrdered => "the operator's order to land stands".into(),
     }
 }

@@ -51,6 +51,8 @@ pub struct Policy {
     pub pose_hover_s: f32,
     /// Pose uncertain: come down.
     pub pose_land_s: f32,
+    /// The place on the plan was searched for in vain: come down.
+    pub search_land_s: f32,
     /// Pose uncertain and fewer than two walls in echo: come down.
     pub walls_land_s: f32,
     /// Pose uncertain and adrift: come down.
@@ -120,6 +122,7 @@ impl Default for Policy {
             pose_stale_s: 0.3,
             pose_hover_s: 1.0,
             pose_land_s: 20.0,
+            search_land_s: 120.0,
             walls_land_s: 5.0,
             drift_land_s: 1.5,
             sonars_hover_s: 0.5,
@@ -160,6 +163,7 @@ impl Policy {
         within("failsafe.pose_stale_s", self.pose_stale_s, 0.1, 2.0)?;
         within("failsafe.pose_hover_s", self.pose_hover_s, 0.1, 5.0)?;
         within("failsafe.pose_land_s", self.pose_land_s, self.pose_hover_s.max(2.0), 120.0)?;
+        within("failsafe.search_land_s", self.search_land_s, 10.0, 300.0)?;
         within("failsafe.walls_land_s", self.walls_land_s, 1.0, 60.0)?;
         within("failsafe.drift_land_s", self.drift_land_s, 0.5, 60.0)?;
         within("failsafe.sonars_hover_s", self.sonars_hover_s, 0.1, 2.0)?;

@@ -118,6 +118,7 @@ pub const TABLE: &[Row] = {
         row(C::SideSonarSilent, &[If::SideSonarSilent], AT_ONCE, A::None, Yes),
         row(C::PoseUncertain, &[If::PoseUncertain], after!(pose_hover_s), A::Hover, AfterStop),
         kept(C::Lost, &[If::PoseUncertain], after!(pose_land_s), A::Descend, AfterStop),
+        kept(C::Lost, &[If::Searching], after!(search_land_s), A::Descend, AfterStop),
         // Sticks ask for a velocity, and nothing measures it.
         kept(C::Lost, &[If::FewWalls], after!(walls_land_s), A::Descend, No),
         kept(C::Lost, &[If::Adrift], after!(drift_land_s), A::Descend, No),

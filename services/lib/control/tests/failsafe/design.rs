@@ -49,7 +49,9 @@ impl Wrong {
         }
         let blind = held(Condition::PoseUncertain, 5.0) && held(Condition::AllSonarsSilent, 5.0);
         // "P(lost) > 5 % or sigma > 0.5 m ...: 20 s ... land."
-        if blind || drifts || held(Condition::PoseUncertain, 20.0) {
+        // A place that was searched for in vain for two minutes is not found by a third.
+        let in_vain = held(Condition::Searching, 120.0);
+        if blind || drifts || in_vain || held(Condition::PoseUncertain, 20.0) {
             return (Action::Descend, Cause::Lost);
         }
         if held(Condition::LandOrdered, 0.0) {
@@ -116,6 +118,7 @@ pub(crate) fn grounds_after_s(condition: Condition) -> Option<f32> {
         Condition::AllSonarsSilent => Some(0.5),
         Condition::PoseUncertain | Condition::LinkSilent => Some(1.0),
         Condition::FewWalls => Some(5.0),
+        Condition::Searching => Some(120.0),
         Condition::Adrift => Some(1.5),
         Condition::HomeUncovered => Some(3.0),
         Condition::ChargeUnknown | Condition::CellLow => Some(10.0),

@@ -27,12 +27,13 @@ fn each_row_acts_from_its_time_on() {
     let home = (Action::Return, Cause::BatteryReturn);
     let lost = (Action::Descend, Cause::Lost);
     type Case<'a> = (&'a [If], f32, (Action, Cause), (Action, Cause));
-    let cases: [Case<'_>; 19] = [
+    let cases: [Case<'_>; 20] = [
         (&[If::NavigationSilent], 0.1, nothing, navigation),
         (&[If::NavigationSilent], 60.0, navigation, (Action::Land, Cause::NavigationSilent)),
         (&[If::OperatorSilent], 0.25, nothing, operator),
         (&[If::PoseUncertain], 1.0, nothing, pose),
         (&[If::PoseUncertain], 20.0, pose, lost),
+        (&[If::Searching], 120.0, nothing, lost),
         (&[If::FewWalls], 5.0, nothing, lost),
         (&[If::Adrift], 1.5, nothing, lost),
         (&[If::AllSonarsSilent], 0.5, nothing, sonars),

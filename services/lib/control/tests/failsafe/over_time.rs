@@ -54,6 +54,7 @@ fn each_condition_clears_after_its_time_without_it() {
     let clears = [
         (Condition::SideSonarSilent, 0.5),
         (Condition::PoseUncertain, 0.5),
+        (Condition::Searching, 0.5),
         (Condition::FewWalls, 0.5),
         (Condition::ChargeUnknown, 0.5),
         (Condition::CellEmpty, 0.5),
@@ -71,7 +72,8 @@ fn each_condition_clears_after_its_time_without_it() {
     assert_eq!(clears.len(), Condition::ALL.len());
     for (condition, clear_s) in clears {
         let mut flight = Flight::new(Stage::Autonomous);
-        let long_enough = flight.tell(condition, true).run(12.0);
+        let lasts_s = if condition == Condition::Searching { 121.0 } else { 12.0 };
+        let long_enough = flight.tell(condition, true).run(lasts_s);
         assert_ne!(long_enough.causes, 0, "{condition:?}");
         flight.tell(condition, false);
         if clear_s > 0.05 {
