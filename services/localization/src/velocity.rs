@@ -161,8 +161,8 @@ impl Velocity {
             (self.filter.state[i], self.filter.state[i + Y]) = (cos * x - sin * y, sin * x + cos * y);
         }
         self.filter.carry(&turned);
-        for axis in 0..2 {
-            self.filter.set(PLACE + Y * axis, place[axis], PLACE_M);
+        for (axis, place) in place.into_iter().enumerate() {
+            self.filter.set(PLACE + Y * axis, place, PLACE_M);
         }
         (self.time_ns, self.pings) = (time_ns, Default::default());
     }

@@ -140,7 +140,7 @@ impl Confessor {
         }
         self.alarmed = alarmed;
         if let Some(since) = self.alarm_since {
-            if !(error <= RIGHT_M) {
+            if error.is_nan() || error > RIGHT_M {
                 self.alarm_since = None;
             } else if now_s - since >= ALARM_S || !alarmed {
                 self.false_alarms += 1;
