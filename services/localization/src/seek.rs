@@ -94,6 +94,11 @@ pub(crate) struct Found {
 const AUDIT_M: f32 = 4.0;
 const AUDIT_TURN_RAD: f32 = 0.25;
 const AUDIT_EVERY_S: f64 = 6.0;
+/// One audit in so many looks at the whole plan and at all headings, and so does the next one when an audit finds another
+/// place likelier: halls are alike from both ends, and a wrong end is believed for as long as nobody asks about the other.
+const WIDE_EVERY: u32 = 8;
+/// A check is over when the place has been the likeliest for so much of the way, metres: past a corner or a door.
+const CHECK_M: f32 = 5.0;
 
 /// The room that the drone is known to be in.
 struct Within {
@@ -111,6 +116,10 @@ pub(crate) struct Seek {
     /// Readings since the last search began, and when that was.
     fresh: u32,
     began_ns: u64,
+    /// Audits so far, whether the one that runs is wide, and whether the last one found another place likelier.
+    audits: u32,
+    wide: bool,
+    strays: bool,
     /// The frame's heading less the compass, fixed while one search follows the other.
     pub(crate) offset_rad: f32,
 }
@@ -129,6 +138,9 @@ impl Seek {
             last: None,
             fresh: 0,
             began_ns: 0,
+            audits: 0,
+            wide: false,
+            strays: false,
             offset_rad: 0.0,
         }
     }
@@ -154,7 +166,7 @@ impl Seek {
     pub(crate) fn forget(&mut self) {
         self.trail.clear();
         self.search.cancel();
-        (self.last, self.fresh) = (None, 0);
+        (self.last, self.fresh, self.strays) = (None, 0, false);
     }
 
     /// Share of the likeliest place in the last search; 0 before the first.
@@ -194,20 +206,23 @@ impl Seek {
                 LEAST_READINGS
             };
             let enough = self.trail.len() >= least && self.trail.around() >= LEAST_AROUND;
-            let rests = self.why == Some(Why::Audit) && seconds(self.began_ns, now) < AUDIT_EVERY_S;
+            let rests =
+                self.why == Some(Why::Audit) && !self.strays && seconds(self.began_ns, now) < AUDIT_EVERY_S;
             if !enough || rests || self.fresh < FRESH_READINGS {
                 return (false, None);
             }
             (self.fresh, self.began_ns) = (0, now);
+            self.audits = self.audits.wrapping_add(1);
+            self.wide = self.strays || self.audits.is_multiple_of(WIDE_EVERY);
             let turns = match self.why {
                 Some(Why::Lost) => Turns { middle_rad: 0.0, half_rad: LOST_TURN_RAD },
-                Some(Why::Audit) => Turns { middle_rad: 0.0, half_rad: AUDIT_TURN_RAD },
+                Some(Why::Audit) if !self.wide => Turns { middle_rad: 0.0, half_rad: AUDIT_TURN_RAD },
                 _ => Turns::ALL,
             };
             self.search.begin(&self.trail, here, turns, suspect);
         }
         let within = self.within.as_ref().filter(|_| self.why == Some(Why::Start));
-        let around = suspect.filter(|_| self.why == Some(Why::Audit));
+        let around = suspect.filter(|_| self.why == Some(Why::Audit) && !self.wide);
         let allowed = |x: f32, y: f32| {
             within.is_none_or(|w| w.rooms.room_at(x, y) == Some(w.room))
                 && around.is_none_or(|(ax, ay, _)| (x - ax).hypot(y - ay) < AUDIT_M)
@@ -239,8 +254,10 @@ impl Seek {
         let wait_s = if self.why == Some(Why::Lost) { AGREED_LOST_S } else { AGREED_S };
         let waited = seconds(answer.agreed_ns, now) >= wait_s;
         let confirms = suspect.is_some_and(|(sx, sy, _)| (x - sx).hypot(y - sy) < NEAR_M);
+        self.strays = self.why == Some(Why::Audit) && !confirms && share >= FAIRLY_SURE;
         let sure = match self.why {
-            Some(Why::Check | Why::Audit) if confirms => share >= SURE,
+            Some(Why::Check) if confirms => share >= SURE && way_m - answer.agreed_m >= CHECK_M,
+            Some(Why::Audit) if confirms => share >= SURE,
             Some(Why::Check | Why::Audit) => share >= SURE_OF_ANOTHER && flown,
             _ => share >= SURE && (flown || waited),
         };
