@@ -27,7 +27,13 @@ const FAIRLY_SURE: f32 = 0.9;
 const AGREED_M: f32 = 1.0;
 const AGREED_S: f64 = 6.0;
 /// The same for a set that has lost its place, seconds: it knows its heading, and the failsafe brings it down after 20.
-const AGREED_LOST_S: f64 = 3.0;
+const AGREED_LOST_S: f64 = 5.0;
+/// A set loses its place to one near by: a slip, the next door, a gap that looked like another. A place farther than this from
+/// where it was, metres, needs so much better readings.
+const NEAR_BY_M: f32 = 4.0;
+const FAR_SHARE: f32 = 0.1;
+/// A place that was found and is not confirmed on so much of the way, metres, was none.
+const UNCONFIRMED_M: f32 = 12.0;
 /// A check needs so many readings.
 const CHECK_READINGS: usize = 60;
 /// And of which the place explains so much of what was heard: among clutter and behind a door that is shut the true one
@@ -94,9 +100,6 @@ pub(crate) struct Found {
 const AUDIT_M: f32 = 4.0;
 const AUDIT_TURN_RAD: f32 = 0.25;
 const AUDIT_EVERY_S: f64 = 6.0;
-/// One audit in so many looks at the whole plan and at all headings, and so does the next one when an audit finds another
-/// place likelier: halls are alike from both ends, and a wrong end is believed for as long as nobody asks about the other.
-const WIDE_EVERY: u32 = 8;
 /// A check is over when the place has been the likeliest for so much of the way, metres: past a corner or a door.
 const CHECK_M: f32 = 5.0;
 
@@ -116,9 +119,7 @@ pub(crate) struct Seek {
     /// Readings since the last search began, and when that was.
     fresh: u32,
     began_ns: u64,
-    /// Audits so far, whether the one that runs is wide, and whether the last one found another place likelier.
-    audits: u32,
-    wide: bool,
+    /// The last audit found another place likelier: the next one follows at once.
     strays: bool,
     /// The frame's heading less the compass, fixed while one search follows the other.
     pub(crate) offset_rad: f32,
@@ -138,8 +139,6 @@ impl Seek {
             last: None,
             fresh: 0,
             began_ns: 0,
-            audits: 0,
-            wide: false,
             strays: false,
             offset_rad: 0.0,
         }
@@ -180,6 +179,11 @@ impl Seek {
         away.map(|(_, share)| share).sum()
     }
 
+    /// Whether a check has gone on for too long.
+    pub(crate) fn is_unconfirmed(&self) -> bool {
+        self.why == Some(Why::Check) && self.trail.way_m() > UNCONFIRMED_M
+    }
+
     pub(crate) fn hear(&mut self, time_ns: u64, here: &TrailPose, readings: &[Reading]) {
         self.trail.push(seconds(0, time_ns), here, readings);
         self.fresh = self.fresh.saturating_add(readings.len() as u32);
@@ -212,17 +216,15 @@ impl Seek {
                 return (false, None);
             }
             (self.fresh, self.began_ns) = (0, now);
-            self.audits = self.audits.wrapping_add(1);
-            self.wide = self.strays || self.audits.is_multiple_of(WIDE_EVERY);
             let turns = match self.why {
                 Some(Why::Lost) => Turns { middle_rad: 0.0, half_rad: LOST_TURN_RAD },
-                Some(Why::Audit) if !self.wide => Turns { middle_rad: 0.0, half_rad: AUDIT_TURN_RAD },
+                Some(Why::Audit) => Turns { middle_rad: 0.0, half_rad: AUDIT_TURN_RAD },
                 _ => Turns::ALL,
             };
             self.search.begin(&self.trail, here, turns, suspect);
         }
         let within = self.within.as_ref().filter(|_| self.why == Some(Why::Start));
-        let around = suspect.filter(|_| self.why == Some(Why::Audit) && !self.wide);
+        let around = suspect.filter(|_| self.why == Some(Why::Audit));
         let allowed = |x: f32, y: f32| {
             within.is_none_or(|w| w.rooms.room_at(x, y) == Some(w.room))
                 && around.is_none_or(|(ax, ay, _)| (x - ax).hypot(y - ay) < AUDIT_M)
@@ -234,12 +236,19 @@ impl Seek {
     }
 
     fn judge(&mut self, now: u64, here: &TrailPose, suspect: Option<(f32, f32, f32)>) -> Option<Found> {
-        let best = *self.search.hypotheses().first()?;
+        // Where the set was lost weighs for what is near.
+        let lost_at = suspect.filter(|_| self.why == Some(Why::Lost));
+        let prior = |of: &Hypothesis| match lost_at {
+            Some((x, y, _)) if (of.x - x).hypot(of.y - y) > NEAR_BY_M => FAR_SHARE * of.weight,
+            _ => of.weight,
+        };
+        let all: f32 = self.search.hypotheses().iter().map(prior).sum();
+        let best = *self.search.hypotheses().iter().max_by(|a, b| prior(a).total_cmp(&prior(b)))?;
         let near = |other: &&Hypothesis| {
             (other.x - best.x).hypot(other.y - best.y) < NEAR_M
                 && wrap_angle(other.turn_rad - best.turn_rad).abs() < NEAR_RAD
         };
-        let share: f32 = self.search.hypotheses().iter().filter(near).map(|other| other.weight).sum();
+        let share: f32 = self.search.hypotheses().iter().filter(near).map(prior).sum::<f32>() / all.max(1e-6);
         let (origin, way_m) = (self.search.origin(), self.trail.way_m());
         let mut answer = Answer { best, origin, share, agreed_ns: now, agreed_m: way_m };
         let (x, y, turn_rad) = answer.carried(here);

@@ -69,6 +69,8 @@ pub struct Localization {
     seek: Seek,
     /// Share of the last search for another place.
     elsewhere: f32,
+    /// A place that was found was not confirmed in time.
+    unconfirmed: bool,
     /// Number and time of the last set sent.
     sent: u64,
     sent_ns: u64,
@@ -143,6 +145,7 @@ impl Service for Localization {
             set: Set::None,
             seek,
             elsewhere: 0.0,
+            unconfirmed: false,
             sent: 0,
             sent_ns: 0,
             grounded: true,
