@@ -7,6 +7,9 @@ use crate::field::message;
 /// Most RC channels in a frame (FACTS 1: more than 18 is an error).
 pub const MAX_CHANNELS: usize = 18;
 
+/// How the reason of `flight/state` begins when a human with a radio is asked to arm (the `override` profile).
+pub const ARM_WITH_THE_RADIO: &str = "arm with the radio";
+
 message! {
     /// Attitude by the flight controller's own filter (it is wrong under acceleration).
     pub struct Attitude on "flight/attitude" {

@@ -9,7 +9,9 @@ use crate::stick::StickLaw;
 use crate::wish::{AUX_ARM, HIGH_US, LOW_US, Wish, neutral};
 use crate::words::write_blocks;
 use core::fmt::{self, Write};
-use ipc_types::{Attitude, Channels, FlightState, Ladder as Step, LinkState, Power, Text};
+use ipc_types::{
+    ARM_WITH_THE_RADIO, Attitude, Channels, FlightState, Ladder as Step, LinkState, Power, Text,
+};
 
 /// Time between two frames when nobody gives the beat: 50 a second.
 const FRAME_NS: u64 = 20_000_000;
@@ -133,8 +135,12 @@ impl Core {
             Profile::Override => None,
         };
         let decision = self.ladder.decide(now, self.wish.as_ref(), believed);
-        // Before anything is known the arm switch has no position: a low one would drop an aircraft in the air.
-        let known = self.wish.is_some() || armed == Some(false);
+        // Before anything is known the arm switch has no position: a low one would drop an aircraft in the air. Beside a
+        // radio it is the neutral throttle that would, and the controller goes on with the last sticks meanwhile.
+        let known = match self.config.profile {
+            Profile::Receiver => self.wish.is_some() || armed == Some(false),
+            Profile::Override => armed.is_some(),
+        };
         let raised = known
             && self.config.profile == Profile::Receiver
             && self.switch.step(now, decision.arm, &self.link.evidence(now));
@@ -335,7 +341,7 @@ impl Core {
                 write_blocks(&blocks, out)
             }
             _ if self.config.profile == Profile::Override && wanted && !armed => {
-                out.write_str("arm with the radio: in this set-up only its pilot can")
+                write!(out, "{ARM_WITH_THE_RADIO}: in this set-up only its pilot can")
             }
             _ => match self.ladder.current() {
                 Step::Level | Step::Descend => out.write_str("the pilot is silent: coming down level"),

@@ -1,6 +1,7 @@
 //! What the simulator may be told.
 
 use airframe::controller::{FailsafeSettings, Firmware};
+use airframe::radio::SafetyPilot;
 use airframe::simulation::{Options, StartPlace};
 use airframe::world::ClutterLevel;
 use runtime::{ConfigError, Validate, within};
@@ -17,6 +18,10 @@ pub struct Config {
     pub firmware: String,
     /// Whether the flight controller has a magnetometer; without, its heading drifts with the gyro.
     pub magnetometer: bool,
+    /// Its receiver: `msp`, or `radio` (a safety pilot with a radio, for the `override` profile of `flight`).
+    pub receiver: String,
+    /// Seconds after which the safety pilot takes the sticks back that he lent, whatever he sees; 0: never.
+    pub take_back_s: f64,
     /// How its failsafe is set: `factory` (the aircraft falls) or `level-descent` (FACTS 1, mitigation).
     pub failsafe: String,
     /// Share of the battery's charge at the start.
@@ -34,6 +39,8 @@ impl Default for Config {
             start: "pad".to_owned(),
             firmware: Firmware::default().name().to_owned(),
             magnetometer: true,
+            receiver: MSP.to_owned(),
+            take_back_s: 0.0,
             failsafe: "factory".to_owned(),
             charge: 1.0,
             dead_sonars: Vec::new(),
@@ -53,6 +60,11 @@ impl Validate for Config {
         if Firmware::by_name(&self.firmware).is_none() {
             return Err(ConfigError::range("firmware", &self.firmware, Firmware::names()));
         }
+        if !RECEIVERS.contains(&self.receiver.as_str()) {
+            return Err(ConfigError::range("receiver", &self.receiver, RECEIVERS.join(", ")));
+        }
+        // Longer than any battery lasts.
+        within("take_back_s", self.take_back_s, 0.0..=3600.0)?;
         if !FAILSAFES.contains(&self.failsafe.as_str()) {
             return Err(ConfigError::range("failsafe", &self.failsafe, FAILSAFES.join(", ")));
         }
@@ -61,6 +73,9 @@ impl Validate for Config {
     }
 }
 
+const MSP: &str = "msp";
+const RADIO: &str = "radio";
+const RECEIVERS: [&str; 2] = [MSP, RADIO];
 const FACTORY: &str = "factory";
 const LEVEL_DESCENT: &str = "level-descent";
 const FAILSAFES: [&str; 2] = [FACTORY, LEVEL_DESCENT];
@@ -102,6 +117,8 @@ impl Config {
             seed,
             firmware,
             magnetometer: self.magnetometer,
+            radio: (self.receiver == RADIO)
+                .then(|| SafetyPilot::new(Some(self.take_back_s).filter(|wait_s| *wait_s > 0.0))),
             failsafe,
             start: start_place(&self.start).unwrap_or_default(),
             charge: self.charge,
@@ -131,6 +148,8 @@ mod tests {
             (Config { clutter: "some".into(), ..Config::default() }, "clutter"),
             (Config { start: "roof".into(), ..Config::default() }, "start"),
             (Config { firmware: "inav".into(), ..Config::default() }, "firmware"),
+            (Config { receiver: "telepathy".into(), ..Config::default() }, "receiver"),
+            (Config { take_back_s: -1.0, ..Config::default() }, "take_back_s"),
             (Config { failsafe: "hope".into(), ..Config::default() }, "failsafe"),
             (Config { displaced_m: -1.0, ..Config::default() }, "displaced_m"),
             (Config { charge: f64::NAN, ..Config::default() }, "charge"),

@@ -2,7 +2,9 @@
 
 use crate::{Config, build_world};
 use airframe::simulation::{PingAnswer, STEP_NS, Simulation, TruthState};
-use ipc_types::{Echo, EchoReading, MAX_PEOPLE, PersonTruth, Ping, Text, Truth};
+use ipc_types::{
+    ARM_WITH_THE_RADIO, Echo, EchoReading, FlightState, MAX_PEOPLE, PersonTruth, Ping, Text, Truth,
+};
 use runtime::{ByteDevice, Input, Output, Ports, Service, Start, StartError};
 use std::fmt::Write;
 
@@ -23,6 +25,8 @@ const REOPEN_STEPS: u64 = 200;
 pub struct Simulator {
     flight: Simulation,
     pings: Input<Ping>,
+    /// What a safety pilot reads; nobody does where there is none.
+    states: Input<FlightState>,
     echoes: Output<Echo>,
     truths: Output<Truth>,
     controller: Box<dyn ByteDevice>,
@@ -57,6 +61,7 @@ impl Service for Simulator {
         Ok(Self {
             flight: Simulation::in_world(world, &start.vehicle, &options),
             pings: ports.input()?,
+            states: ports.input()?,
             echoes: ports.output()?,
             truths: ports.output()?,
             controller,
@@ -72,6 +77,9 @@ impl Service for Simulator {
 
     fn step(&mut self, now: u64) {
         let begin = self.keep_up(now);
+        while let Some(state) = self.states.receive() {
+            self.flight.ask_to_arm(state.reason.as_str().starts_with(ARM_WITH_THE_RADIO));
+        }
         self.flight.advance_to(now.saturating_sub(begin));
         self.steps += 1;
         self.exchange();

@@ -12,11 +12,15 @@ fn deploy() -> String {
 }
 
 fn truths(seed: u64, seconds: u64) -> Vec<Truth> {
+    truths_of(Config::default(), seed, seconds)
+}
+
+fn truths_of(config: Config, seed: u64, seconds: u64) -> Vec<Truth> {
     let (manifest, root) = load_manifest(&deploy()).unwrap();
     let mut bus = Lockstep::new(manifest, &root, seed, Cache::default());
     let mut ports = bus.tool("cli");
     let mut truth = ports.input::<Truth>().unwrap();
-    bus.add_with::<Simulator>(Config::default()).unwrap();
+    bus.add_with::<Simulator>(config).unwrap();
     let mut all = Vec::new();
     let begin = bus.now();
     // More often than an input's depth of samples.
@@ -45,6 +49,14 @@ fn the_truth_comes_at_50_hz_and_the_drone_waits_on_the_pad() {
     let start = Start::new(manifest.system.clone(), &root, seed, 0, true, Cache::default()).unwrap();
     let pad = simulator::build_world(&Config::default(), &start).unwrap().pad();
     assert!((last.x_m - pad.x).hypot(last.y_m - pad.y) < 0.05, "{last:?} {pad:?}");
+}
+
+/// The safety pilot reads `flight/state`, which the manifest must allow, and does nothing while nobody asks him.
+#[test]
+fn a_radio_beside_it_changes_nothing_on_the_ground() {
+    let beside = Config { receiver: "radio".to_owned(), ..Config::default() };
+    let (alone, beside) = (truths(3, 2), truths_of(beside, 3, 2));
+    assert_eq!(format!("{alone:?}"), format!("{beside:?}"));
 }
 
 #[test]

@@ -6,6 +6,7 @@ pub mod clutter;
 pub mod controller;
 pub mod people;
 pub mod picture;
+pub mod radio;
 pub mod score;
 pub mod simulation;
 pub mod vehicle;

@@ -36,6 +36,10 @@ const MAGNETOMETER: u16 = 1 << 2;
 const BOX_ARM: u8 = 0;
 const BOX_ANGLE: u8 = 1;
 const BOX_FAILSAFE: u8 = 27;
+const BOX_MSP_OVERRIDE: u8 = 50;
+/// Receiver over MSP, and on a serial line: bits of Betaflight's feature word.
+const FEATURE_RX_MSP: u32 = 1 << 14;
+const FEATURE_RX_SERIAL: u32 = 1 << 3;
 
 /// What answers are made of.
 pub(super) struct View<'a> {
@@ -128,7 +132,10 @@ pub(super) fn answer(code: u16, view: &View<'_>, out: &mut Payload) -> bool {
                 out.put(p.version_text.as_bytes());
             }
         }
-        MODE_RANGES => mode_ranges(p, out),
+        MODE_RANGES => mode_ranges(view, out),
+        FEATURE_CONFIG if view.receiver.is_radio() && p.features & FEATURE_RX_MSP != 0 => {
+            out.u32(p.features & !FEATURE_RX_MSP | FEATURE_RX_SERIAL);
+        }
         FEATURE_CONFIG => out.u32(p.features),
         RX_CONFIG => rx_config(p, out),
         RX_MAP => out.put(p.rx_map.get(..p.rx_map_length).unwrap_or(&p.rx_map)),
@@ -193,6 +200,7 @@ fn status(extended: bool, view: &View<'_>, out: &mut Payload) {
             BOX_ARM => view.receiver.is_armed(),
             BOX_ANGLE => view.receiver.is_angle(),
             BOX_FAILSAFE => view.receiver.is_failsafe(),
+            BOX_MSP_OVERRIDE => view.receiver.is_overriding(),
             _ => false,
         };
         modes |= u32::from(on) << (index % 32);
@@ -229,11 +237,15 @@ fn status(extended: bool, view: &View<'_>, out: &mut Payload) {
     out.pad_to(end);
 }
 
-/// ARM on AUX1 and ANGLE on AUX2, from 1700 to 2100: in steps of 25 us from 900.
-fn mode_ranges(personality: &Personality, out: &mut Payload) {
+/// ARM on AUX1, ANGLE on AUX2 and, with a radio, MSP OVERRIDE on AUX3, from 1700 to 2100: in steps of 25 us from 900.
+fn mode_ranges(view: &View<'_>, out: &mut Payload) {
+    let end = out.length + 4 * view.personality.mode_slots;
     out.put(&[BOX_ARM, 0, 32, 48]);
     out.put(&[BOX_ANGLE, 1, 32, 48]);
-    out.pad_to(4 * personality.mode_slots);
+    if view.receiver.is_radio() && view.personality.boxes.iter().any(|(id, _)| *id == BOX_MSP_OVERRIDE) {
+        out.put(&[BOX_MSP_OVERRIDE, 2, 32, 48]);
+    }
+    out.pad_to(end);
 }
 
 fn rx_config(personality: &Personality, out: &mut Payload) {

@@ -2,6 +2,7 @@
 //! receiver, its arming rules, and its MSP port with the time that bytes and the serial task take.
 
 mod attitude;
+mod companion;
 mod framing;
 mod loops;
 mod messages;
@@ -11,7 +12,7 @@ mod wire;
 
 pub use personality::{
     BETAFLIGHT_4_5, BETAFLIGHT_2025_12, BETAFLIGHT_2026_12, FLIP32, FailsafeSettings, Firmware, Flags,
-    INAV_9_1, Personality, Procedure, StatusLayout, StickLaw,
+    INAV_9_1, MspOverride, Personality, Procedure, StatusLayout, StickLaw,
 };
 pub use wire::{BYTE_NS, Wire};
 
@@ -101,6 +102,19 @@ impl Controller {
             commands_handled: 0,
             magnetometer: true,
         }
+    }
+
+    /// The board with a radio as its receiver: frames come by [`Self::radio`], and those of MSP are used while the radio's
+    /// override switch (AUX3) is up, as the firmware does it.
+    #[must_use]
+    pub fn with_radio(mut self) -> Self {
+        self.receiver.listen_to_radio();
+        self
+    }
+
+    /// A frame of the radio: roll, pitch, yaw, throttle, AUX1 (arm), AUX2 (ANGLE), AUX3 (override), AUX4, microseconds.
+    pub fn radio(&mut self, now_ns: u64, channels_us: &[u16; 8]) {
+        self.receiver.radio(now_ns, channels_us, self.personality);
     }
 
     /// The board without its magnetometer: its heading begins anywhere and drifts with the gyro.

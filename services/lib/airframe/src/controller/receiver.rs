@@ -1,6 +1,7 @@
-//! The receiver (MSP frames), loss of signal, failsafe, modes and arming.
+//! The receiver (MSP frames, or a radio with MSP frames beside it), loss of signal, failsafe, modes and arming.
 
-use super::personality::{FailsafeSettings, Personality, Procedure};
+use super::companion::Companion;
+use super::personality::{FailsafeSettings, MspOverride, Personality, Procedure};
 
 /// Channels of the firmware.
 pub(crate) const CHANNELS: usize = 18;
@@ -10,6 +11,9 @@ pub(crate) const YAW: usize = 2;
 pub(crate) const THROTTLE: usize = 3;
 const AUX1: usize = 4;
 const AUX2: usize = 5;
+const AUX3: usize = 6;
+/// Channels of the radio: the sticks and four switches.
+pub(crate) const RADIO_CHANNELS: usize = 8;
 /// Values that count as a pulse (FACTS 1).
 const VALID_US: core::ops::RangeInclusive<u16> = 885..=2115;
 const CENTRE_US: u16 = 1500;
@@ -47,6 +51,10 @@ pub(crate) struct Receiver {
     armings: u32,
     /// A frame has ever come.
     known: bool,
+    /// MSP frames beside a radio, which is the receiver then.
+    companion: Option<Companion>,
+    /// The radio's override switch is up.
+    overriding: bool,
 }
 
 impl Receiver {
@@ -67,19 +75,60 @@ impl Receiver {
             blocks: 1 << flags.rx_loss | 1 << flags.boot_grace | 1 << flags.calibrating,
             armings: 0,
             known: false,
+            companion: None,
+            overriding: false,
         }
     }
 
-    /// A frame in the receiver's order; what is beyond [`CHANNELS`] is not used. What it does not carry reads as 0.
+    /// The receiver is a radio; MSP frames are its companion's.
+    pub(crate) fn listen_to_radio(&mut self) {
+        self.companion = Some(Companion::new());
+    }
+
+    /// An MSP frame in the receiver's order; what is beyond [`CHANNELS`] is not used. What it does not carry reads as 0.
     pub(crate) fn frame(&mut self, now_ns: u64, frame: &[u16], personality: &Personality) {
+        let read: [u16; CHANNELS] = std::array::from_fn(|channel| {
+            let place = personality.rx_map.get(channel).map_or(channel, |place| usize::from(*place));
+            frame.get(place).copied().unwrap_or(0)
+        });
+        match &mut self.companion {
+            Some(companion) => {
+                companion.hear(
+                    now_ns,
+                    [read[ROLL], read[PITCH], read[YAW], read[THROTTLE]],
+                    personality.msp_override,
+                );
+            }
+            None => self.take(now_ns, &read, personality),
+        }
+    }
+
+    /// A frame of the radio, in the firmware's order; does nothing where MSP is the receiver.
+    pub(crate) fn radio(
+        &mut self,
+        now_ns: u64,
+        channels_us: &[u16; RADIO_CHANNELS],
+        personality: &Personality,
+    ) {
+        let Some(companion) = &self.companion else { return };
+        let mut read = [0; CHANNELS];
+        read[..RADIO_CHANNELS].copy_from_slice(channels_us);
+        self.overriding = read[AUX3] >= SWITCH_US && personality.msp_override != MspOverride::Unknown;
+        if self.overriding
+            && let Some(sticks) = companion.sticks(now_ns, personality.msp_override)
+        {
+            read[..4].copy_from_slice(&sticks);
+        }
+        self.take(now_ns, &read, personality);
+    }
+
+    fn take(&mut self, now_ns: u64, read: &[u16; CHANNELS], personality: &Personality) {
         self.known = true;
         let mut flight_valid = true;
-        for channel in 0..CHANNELS {
-            let place = personality.rx_map.get(channel).map_or(channel, |place| usize::from(*place));
-            let value = frame.get(place).copied().unwrap_or(0);
-            if VALID_US.contains(&value) {
+        for (channel, value) in read.iter().enumerate() {
+            if VALID_US.contains(value) {
                 self.good_ns[channel] = now_ns;
-                self.values[channel] = value;
+                self.values[channel] = *value;
             } else if channel < 4 {
                 flight_valid = false;
             }
@@ -231,6 +280,14 @@ impl Receiver {
 
     pub(crate) fn values(&self) -> &[u16; CHANNELS] {
         &self.values
+    }
+    /// The radio's switch for MSP's sticks is up.
+    pub(crate) fn is_overriding(&self) -> bool {
+        self.overriding
+    }
+    /// A radio is the receiver, and not MSP.
+    pub(crate) fn is_radio(&self) -> bool {
+        self.companion.is_some()
     }
     /// Whether a receiver is known: a frame has come.
     pub(crate) fn is_known(&self) -> bool {

@@ -5,6 +5,7 @@
 
 mod displacement;
 mod ground;
+mod safety;
 mod touch;
 
 #[cfg(test)]
@@ -12,6 +13,7 @@ mod tests;
 
 use crate::acoustics::{Acoustics, Echo, Echoes, GIVE_UP_S, Mount, Pose6};
 use crate::controller::{Controller, FailsafeSettings, Firmware, Senses};
+use crate::radio::SafetyPilot;
 use crate::vehicle::{
     Compass, FlowSensor, FlowSettings, Inertial, Quadrotor, Shape, Surroundings, Variation, normal, within,
 };
@@ -29,7 +31,7 @@ use touch::Touch;
 /// One step of physics and of the flight controller's loops.
 pub const STEP_NS: u64 = 1_000_000;
 const STEP_S: f64 = 1e-3;
-/// How often people move, the compass is read and the battery is measured, in steps.
+/// How often people move, the radio sends, the compass is read and the battery is measured, in steps.
 const SLOW_STEPS: u64 = 20;
 /// Free space that a start in a room needs around the airframe's own radius, metres.
 const START_CLEARANCE_M: f32 = 0.4;
@@ -74,6 +76,8 @@ pub struct Options {
     /// Whether the flight controller has a magnetometer. Without, its heading begins at the compass's arbitrary zero and
     /// then drifts with the gyro's bias (up to 2.75 degrees a minute) and scale.
     pub magnetometer: bool,
+    /// A radio as its receiver, with MSP frames beside it, and who holds the radio; otherwise MSP is the receiver.
+    pub radio: Option<SafetyPilot>,
     /// How its failsafe is set.
     pub failsafe: FailsafeSettings,
     /// Where the drone stands at first.
@@ -93,6 +97,7 @@ impl Default for Options {
             seed: 0,
             firmware: Firmware::default(),
             magnetometer: true,
+            radio: None,
             failsafe: FailsafeSettings::default(),
             start: StartPlace::default(),
             charge: 1.0,
@@ -174,6 +179,9 @@ pub struct Simulation {
     senses: Senses,
     /// What the gyro tells of a turn, over the turn; one with a compass, which corrects it.
     turn_scale: f64,
+    radio: Option<SafetyPilot>,
+    /// The system asks the safety pilot to arm.
+    asked_to_arm: bool,
     ground: GroundWatch,
     touch: Touch,
     wall_m: f64,
@@ -247,6 +255,9 @@ impl Simulation {
             controller = controller.without_magnetometer();
             turn_scale += within(&mut stream(options.seed, GYRO), GYRO_SCALE);
         }
+        if options.radio.is_some() {
+            controller = controller.with_radio();
+        }
         Self {
             world,
             craft,
@@ -262,6 +273,8 @@ impl Simulation {
             step: 0,
             senses,
             turn_scale,
+            radio: options.radio,
+            asked_to_arm: false,
             ground,
             touch,
             wall_m: 10.0,
@@ -279,6 +292,9 @@ impl Simulation {
     }
 
     fn advance_step(&mut self) {
+        if self.step.is_multiple_of(SLOW_STEPS) && self.radio.is_some() {
+            self.radio_sends();
+        }
         let random = &mut self.motion_random;
         if self.step.is_multiple_of(SLOW_STEPS) {
             let motion = self.craft.motion();

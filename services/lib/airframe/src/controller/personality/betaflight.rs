@@ -1,6 +1,6 @@
 //! Betaflight 4.5 and later at its defaults, with `map AETR1234`.
 
-use super::{Flags, Personality, StatusLayout, StickLaw};
+use super::{Flags, MspOverride, Personality, StatusLayout, StickLaw};
 
 /// Flags that have kept their place from 4.3 on; ARM_SWITCH is always the last.
 const fn flags(arm_switch: u32) -> Flags {
@@ -58,6 +58,8 @@ pub const BETAFLIGHT_2025_12: Personality = Personality {
     recovery_stick_us: 0,
     rearm_ns: 1_200_000_000,
     rearm_low: true,
+    // Of 4.5.6 as well.
+    msp_override: MspOverride::Held,
     boot_grace_ns: 5_000_000_000,
     arm_delay_ns: 90_000_000,
     receiver_pass_ns: 40_000_000,
@@ -113,5 +115,7 @@ pub const BETAFLIGHT_2026_12: Personality = Personality {
     status: StatusLayout::Flagged { tail: 6 },
     flags: flags(29),
     rc_needs_receiver: true,
+    // The radio's own within 0.3 s, the radio's frame and the pass included.
+    msp_override: MspOverride::WhileFresh { stale_ns: 240_000_000, steady_ns: 0 },
     ..BETAFLIGHT_2025_12
 };

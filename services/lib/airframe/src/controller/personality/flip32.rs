@@ -4,7 +4,7 @@
 //! channels. The rest is read in public sources: its own of 2017 (betaflight/betaflight: the file stands beside
 //! the number), and what Betaflight's configurator expects of MSP 1.36.
 
-use super::{BETAFLIGHT_2025_12, Flags, Personality, StatusLayout, StickLaw};
+use super::{BETAFLIGHT_2025_12, Flags, MspOverride, Personality, StatusLayout, StickLaw};
 
 /// Betaflight 3.2.5 on an STM32F103.
 pub const FLIP32: Personality = Personality {
@@ -52,6 +52,7 @@ pub const FLIP32: Personality = Personality {
     // PERIOD_OF_3_SECONDS after a drop, flight/failsafe.c; the switch is looked at when they are over.
     rearm_ns: 3_000_000_000,
     rearm_low: false,
+    msp_override: MspOverride::Unknown,
     // `level_limit` 55, in proportion to the stick, and the default rates 1.00 with a super rate of 0.70: flight/pid.c.
     stick: StickLaw::Linear { angle_limit_deg: 55.0, super_rate: 0.7 },
     ..BETAFLIGHT_2025_12

@@ -1,7 +1,7 @@
 //! INAV 9.1 at its defaults, with the receiver set to MSP. What FACTS 1 does not give is read in the public sources
 //! of INAV (iNavFlight/inav: the file stands beside each number).
 
-use super::{BETAFLIGHT_2025_12, Flags, Personality, StatusLayout, StickLaw};
+use super::{BETAFLIGHT_2025_12, Flags, MspOverride, Personality, StatusLayout, StickLaw};
 
 /// INAV 9.1.
 pub const INAV_9_1: Personality = Personality {
@@ -72,6 +72,8 @@ pub const INAV_9_1: Personality = Personality {
     // PERIOD_OF_30_SECONDS after a landing, flight/failsafe.c; the switch is looked at when they are over.
     rearm_ns: 30_000_000_000,
     rearm_low: false,
+    // The periods of a lost and a found receiver, for frames beside a radio too: rx/msp_override.c.
+    msp_override: MspOverride::WhileFresh { stale_ns: 700_000_000, steady_ns: 700_000_000 },
     // `max_angle_inclination_rll` 300, `rc_expo` 70, `yaw_rate` 20, `rc_yaw_expo` 20: fc/settings.yaml.
     stick: StickLaw::Expo { angle: [30.0, 0.7], yaw: [200.0, 0.2] },
     // `min_check`, rx/rx.c.

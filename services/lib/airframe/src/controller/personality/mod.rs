@@ -132,6 +132,8 @@ pub struct Personality {
     pub rearm_ns: u64,
     /// ... with the arm switch low all the while, and not only at its end.
     pub rearm_low: bool,
+    /// What becomes of MSP frames beside a radio.
+    pub msp_override: MspOverride,
     /// No arming before this age.
     pub boot_grace_ns: u64,
     /// From the arm switch to armed, the receiver pass not included.
@@ -163,6 +165,22 @@ pub enum StatusLayout {
     },
     /// Nothing; MSP_STATUS_EX has load, the lower half of the arming flags and the state of calibration.
     Bare,
+}
+
+/// What the override switch of a radio (box 50) does with the sticks of MSP frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MspOverride {
+    /// Nothing: the firmware does not know it.
+    Unknown,
+    /// The sticks of the last frame, for ever and without a flag; 885 us, all four, before the first.
+    Held,
+    /// Those of the last frame while it is fresh, and the radio's own otherwise.
+    WhileFresh {
+        /// Not older than this.
+        stale_ns: u64,
+        /// After frames have come for this long.
+        steady_ns: u64,
+    },
 }
 
 /// Bit numbers of the arming-disable flags that this controller can raise.

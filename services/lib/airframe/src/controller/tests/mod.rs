@@ -4,6 +4,7 @@ mod firmwares;
 mod flying;
 mod link;
 mod protocol;
+mod silence;
 
 use super::*;
 use crate::vehicle::{Compass, Inertial, Quadrotor, Shape, Surroundings, Variation};
@@ -24,6 +25,10 @@ struct Bench {
     received: Vec<u8>,
     /// Frames at 50 Hz while `Some`.
     channels: Option<Vec<u16>>,
+    /// What a radio sends at 50 Hz while `Some`.
+    radio: Option<[u16; 8]>,
+    /// When the last frame of `channels` was sent.
+    sent: u64,
 }
 
 /// Roll, pitch, throttle, yaw, AUX1, AUX2: receiver order.
@@ -52,6 +57,8 @@ impl Bench {
             now: 0,
             received: Vec::new(),
             channels: None,
+            radio: None,
+            sent: 0,
         }
     }
 
@@ -62,6 +69,12 @@ impl Bench {
             let payload: Vec<u8> = channels.iter().flat_map(|c| c.to_le_bytes()).collect();
             let bytes = v1(200, &payload);
             self.controller.write(self.now, &bytes);
+            self.sent = self.now;
+        }
+        if let Some(radio) = &self.radio
+            && self.now.is_multiple_of(20 * MS)
+        {
+            self.controller.radio(self.now, radio);
         }
         let (gyro, accelerometer) = {
             let speeds = self.craft.motor_speeds();
@@ -137,13 +150,16 @@ impl Bench {
     }
 
     fn armed_with(firmware: Firmware, seed: u64, failsafe: FailsafeSettings) -> Self {
-        let mut bench = Self::with(firmware, seed, 0.0, failsafe);
-        bench.send(&IDLE);
-        bench.run(5.2);
-        bench.send(&ARM);
-        bench.run(0.3);
-        assert!(bench.controller.is_armed(), "blocks {:#x}", bench.blocks());
-        bench
+        Self::with(firmware, seed, 0.0, failsafe).arm()
+    }
+
+    fn arm(mut self) -> Self {
+        self.send(&IDLE);
+        self.run(5.2);
+        self.send(&ARM);
+        self.run(0.3);
+        assert!(self.controller.is_armed(), "blocks {:#x}", self.blocks());
+        self
     }
 
     /// Flies `seconds` at `height` with cascaded proportional loops on the truth: the throttle returned is
