@@ -1,6 +1,7 @@
 //! Configuration files: unknown keys and values out of range are refused by name.
 
 use crate::{StartError, fnv};
+use manifest::plain;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -37,7 +38,8 @@ fn prefix(file: &str) -> String {
 impl ConfigError {
     /// A value outside its range.
     pub fn range(field: &'static str, value: impl Display, allowed: impl Into<String>) -> Self {
-        Self::Range { file: String::new(), field, value: value.to_string(), allowed: allowed.into() }
+        let value = plain(&value.to_string());
+        Self::Range { file: String::new(), field, value, allowed: allowed.into() }
     }
 
     /// The same, naming the file.
@@ -90,7 +92,7 @@ where
 {
     let config: C = toml::from_str(text).map_err(|error| ConfigError::Syntax {
         file: file.to_owned(),
-        reason: error.to_string().trim_end().replace('\n', " "),
+        reason: plain(&error.to_string().trim_end().replace('\n', " ")),
     })?;
     config.validate().map_err(|error| error.in_file(file))?;
     Ok(config)
@@ -134,6 +136,16 @@ mod tests {
         let error = parse_config::<Cruise>("pilot.toml", "speed_m_s = 9").unwrap_err().to_string();
         assert_eq!(error, "pilot.toml: speed_m_s = 9 is out of range: allowed is 0.1..=2");
         assert!(parse_config::<Cruise>("pilot.toml", "speed_m_s = nan").is_err());
+    }
+
+    #[test]
+    fn a_message_is_one_plain_line_whatever_the_file_says() {
+        for text in ["\"a\\nb\" = 1", "\"\\u001b[2J\" = 1", "speed_m_s =\t1x", "speed_m_s = \"\u{7f}\""] {
+            let error = parse_config::<Cruise>("pilot.toml", text).unwrap_err().to_string();
+            assert!(!error.chars().any(char::is_control), "{error:?}");
+        }
+        let error = ConfigError::range("clutter", "full\r\nall is well", "none, light, full").to_string();
+        assert_eq!(error, "clutter = full\\r\\nall is well is out of range: allowed is none, light, full");
     }
 
     #[test]

@@ -106,18 +106,32 @@ pub enum PlanError {
     },
 }
 
+/// What a file says, as a message may quote it: control characters are spelt out. A message ends in a terminal and in
+/// a log, where whoever drew the plan must not move the cursor or begin lines of his own.
+pub(crate) fn plain(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for character in text.chars() {
+        if character.is_control() {
+            plain.extend(character.escape_default());
+        } else {
+            plain.push(character);
+        }
+    }
+    plain
+}
+
 impl PlanError {
     pub(crate) fn syntax(file: &str, error: &impl ToString) -> Self {
         let text = error.to_string();
-        let reason = text.lines().next().unwrap_or("no reason given").trim().to_owned();
+        let reason = plain(text.lines().next().unwrap_or("no reason given").trim());
         Self::Syntax { file: file.to_owned(), reason }
     }
 
     pub(crate) fn range(file: &str, field: &str, value: &dyn ToString, allowed: &str) -> Self {
         Self::Range {
             file: file.to_owned(),
-            field: field.to_owned(),
-            value: value.to_string(),
+            field: plain(field),
+            value: plain(&value.to_string()),
             allowed: allowed.to_owned(),
         }
     }

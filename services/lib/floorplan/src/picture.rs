@@ -2,6 +2,7 @@ use std::io::Cursor;
 
 use image::{DynamicImage, ImageReader, Limits};
 
+use crate::error::plain;
 use crate::plan::{MAX_CELLS, MAX_SIDE};
 use crate::{Cell, PictureMode, PlanError, PlanHeader};
 
@@ -9,8 +10,8 @@ use crate::{Cell, PictureMode, PlanError, PlanHeader};
 pub(crate) fn read(file: &str, header: &PlanHeader, bytes: &[u8]) -> Result<(usize, Vec<Cell>), PlanError> {
     let not_an_image = |reason: &dyn ToString| PlanError::NotAnImage {
         file: file.to_owned(),
-        picture: header.image.clone(),
-        reason: reason.to_string(),
+        picture: plain(&header.image),
+        reason: plain(&reason.to_string()),
     };
     if bytes.is_empty() {
         return Err(not_an_image(&"it is empty"));

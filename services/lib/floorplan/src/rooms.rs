@@ -64,7 +64,7 @@ impl Rooms {
                 "an area with free cells",
             ));
         }
-        let names = sidecar.rooms.iter().take(MAX_ROOMS).map(|room| room.name.trim().to_owned()).collect();
+        let names = sidecar.rooms.iter().take(MAX_ROOMS).map(|room| room.name.clone()).collect();
         Ok(Self::with(plan, names, of_cell))
     }
 

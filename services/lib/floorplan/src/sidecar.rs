@@ -151,8 +151,13 @@ impl Sidecar {
     /// # Errors
     /// Unreadable yaml, unknown keys, names missing or used twice, coordinates that are not numbers.
     pub fn parse(file: &str, yaml: &[u8]) -> Result<Self, PlanError> {
-        let sidecar: Self =
+        let mut sidecar: Self =
             serde_saphyr::from_slice(yaml).map_err(|error| PlanError::syntax(file, &error))?;
+        // "Store" and "Store " are one name to whoever reads them.
+        let doors = sidecar.doors.iter_mut().map(|door| &mut door.name);
+        for name in sidecar.rooms.iter_mut().map(|room| &mut room.name).chain(doors) {
+            *name = name.trim().to_owned();
+        }
         sidecar.check(file)?;
         Ok(sidecar)
     }
@@ -228,7 +233,7 @@ impl Sidecar {
 
 fn check_name(file: &str, field: &str, name: &str) -> Result<(), PlanError> {
     // What fits the page and the messages.
-    if (1..=31).contains(&name.trim().len()) && !name.chars().any(char::is_control) {
+    if (1..=31).contains(&name.len()) && !name.chars().any(char::is_control) {
         return Ok(());
     }
     Err(PlanError::range(file, field, &format!("{name:?}"), "1 to 31 bytes of text"))

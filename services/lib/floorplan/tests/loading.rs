@@ -204,3 +204,10 @@ fn thresholds_are_the_headers() {
     assert_eq!(at(0.6, 0.25), [Occupied, Occupied, Unknown, Free, Free]);
     assert_eq!(at(0.4, 0.3), [Occupied, Occupied, Occupied, Free, Free]);
 }
+
+#[test]
+fn a_message_is_one_plain_line_whatever_the_header_says() {
+    let image = HEADER.replace("image: a.pgm", r#"image: "a\n\e[2Jb""#);
+    let text = sentence(load(&image, b"no picture"));
+    assert!(text.contains(r"`a\n\u{1b}[2Jb`") && !text.chars().any(char::is_control), "{text:?}");
+}

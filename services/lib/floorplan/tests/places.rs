@@ -113,6 +113,8 @@ fn a_wrong_sidecar_is_refused_in_one_sentence() {
         ("b: [2.5, 1.6]", "b: [2.5, 0.8]", "`doors: Door` is 0.00 m wide"),
         ("name: Hall", "name: Triangle", "used twice"),
         ("name: Hall", "name: \"\"", "1 to 31 bytes of text"),
+        ("name: Hall", "name: \" Triangle \"", "used twice"),
+        ("name: Hall", r#"name: "Hall\nall is well""#, r#"is "Hall\nall is well""#),
         ("[2.6, 0.2], [4.8, 0.2], [4.8, 2.4]", "[2.6, 0.2]", "`rooms: Triangle` is 1 corners"),
         ("[2.5, 2.6, 0, 0]", "[2.5, 2.6, 0]", "cannot be read"),
         ("[2.5, 2.6, 0, 0]", "[70, 70, 80, 80]", "without a free cell of the plan"),

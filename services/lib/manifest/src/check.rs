@@ -1,6 +1,6 @@
 //! Whether the parts fit together.
 
-use crate::error::ManifestError;
+use crate::error::{ManifestError, plain};
 use crate::model::Manifest;
 use std::collections::BTreeMap;
 
@@ -27,7 +27,11 @@ impl Manifest {
     pub fn problems(&self, known_topics: &[&str]) -> Vec<ManifestError> {
         let mut found = Vec::new();
         let mut problem = |field: String, message: String| {
-            found.push(ManifestError::Wiring { file: self.file.clone(), field, message });
+            found.push(ManifestError::Wiring {
+                file: self.file.clone(),
+                field: plain(&field),
+                message: plain(&message),
+            });
         };
         let known = |topic: &str| {
             known_topics.iter().any(|k| {

@@ -126,7 +126,23 @@ pub(crate) fn line_of(text: &str, span: Option<std::ops::Range<usize>>) -> usize
     text.as_bytes()[..end].iter().filter(|b| **b == b'\n').count() + 1
 }
 
-/// The first words of a parser's message on one line.
-pub(crate) fn one_line(message: &str) -> String {
-    message.split('\n').map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join("; ")
+/// A parser's message on one line.
+#[must_use]
+pub fn one_line(message: &str) -> String {
+    plain(&message.split('\n').map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join("; "))
+}
+
+/// What a file says, as a message may quote it: control characters are spelt out. A message ends in a terminal and in
+/// a log, where whoever wrote the file must not move the cursor or begin lines of his own.
+#[must_use]
+pub fn plain(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for character in text.chars() {
+        if character.is_control() {
+            plain.extend(character.escape_default());
+        } else {
+            plain.push(character);
+        }
+    }
+    plain
 }

@@ -12,7 +12,7 @@ mod model;
 mod raw;
 mod vehicle;
 
-pub use error::{ManifestError, VehicleError};
+pub use error::{ManifestError, VehicleError, one_line, plain};
 pub use model::{
     Criticality, Manifest, Publication, Restart, RestartPolicy, ServiceEntry, Subscription, System,
     ToolEntry, Topic,

@@ -1,6 +1,6 @@
 //! The manifest as written: every key optional, so that a file and its overlay are read alike.
 
-use crate::error::{ManifestError, line_of, one_line};
+use crate::error::{ManifestError, line_of, one_line, plain};
 use crate::model::{
     Criticality, Manifest, Publication, Restart, ServiceEntry, Subscription, System, ToolEntry,
 };
@@ -245,14 +245,14 @@ struct Source<'a> {
 
 impl Source<'_> {
     fn missing(&self, field: &str, hint: &str) -> ManifestError {
-        ManifestError::Missing { file: self.file.to_owned(), field: field.to_owned(), hint: hint.to_owned() }
+        ManifestError::Missing { file: self.file.to_owned(), field: plain(field), hint: hint.to_owned() }
     }
 
     fn range(&self, field: &str, value: impl Display, allowed: impl Into<String>) -> ManifestError {
         ManifestError::Range {
             file: self.file.to_owned(),
-            field: field.to_owned(),
-            value: value.to_string(),
+            field: plain(field),
+            value: plain(&value.to_string()),
             allowed: allowed.into(),
         }
     }

@@ -323,17 +323,23 @@ impl Check<'_> {
         })
     }
 
+    /// What the page and the messages can show.
+    fn name(&self, field: &str, name: &str) -> Result<(), VehicleError> {
+        if (1..=32).contains(&name.len()) && !name.chars().any(char::is_control) {
+            return Ok(());
+        }
+        Err(VehicleError::Range {
+            file: self.file.to_owned(),
+            field: field.to_owned(),
+            value: format!("{name:?}"),
+            allowed: "1 to 32 bytes of text".to_owned(),
+        })
+    }
+
     /// Ranges of single values: from the smallest machine that carries a Pi indoors to the largest that fits
     /// through a 0.9 m door.
     fn numbers(&self, v: &RawVehicle) -> Result<(), VehicleError> {
-        if v.name.is_empty() || v.name.len() > 32 {
-            return Err(VehicleError::Range {
-                file: self.file.to_owned(),
-                field: "name".to_owned(),
-                value: format!("{:?}", v.name),
-                allowed: "1 to 32 characters".to_owned(),
-            });
-        }
+        self.name("name", &v.name)?;
         self.within("body.radius_m", v.body.radius_m, 0.05, 0.6)?;
         self.within("body.height_m", v.body.height_m, 0.03, 0.6)?;
         self.within("body.mass_kg", v.body.mass_kg, 0.1, 5.0)?;
@@ -368,6 +374,7 @@ impl Check<'_> {
             self.within("sonar (how many)", v.sonar.len() as f32, 1.0, 16.0)?;
         }
         for s in &v.sonar {
+            self.name("sonar.name", &s.name)?;
             let field = |what: &str| format!("sonar {}: {what}", s.name);
             self.within(&field("bearing_deg"), s.bearing_deg, -360.0, 360.0)?;
             self.within(&field("elevation_deg"), s.elevation_deg, -90.0, 90.0)?;

@@ -281,3 +281,24 @@ fn a_pad_is_a_place_and_a_heading() {
     assert!(said("pad = [1.0, 2.0, 400.0]").contains("system.pad: heading = 400: allowed is -360 to 360"));
     assert!(said("pad = [1.0, 2.0]").starts_with("m.toml:"), "{}", said("pad = [1.0, 2.0]"));
 }
+
+#[test]
+fn a_message_is_one_plain_line_whatever_the_file_says() {
+    let texts = [
+        SMALL.replace("name = \"s\"", r#"name = "s\nall is well""#),
+        SMALL.replace(
+            "name = \"s\"",
+            r#"name = "s"
+"\u001b[2J" = 1"#,
+        ),
+        format!("{SMALL}\n[service.\"a\\nb\"]\nrun = \"x\"\n"),
+    ];
+    for text in texts {
+        let error = Manifest::parse("m.toml", &text).unwrap_err().to_string();
+        assert!(!error.chars().any(char::is_control), "{error:?}");
+    }
+    let wired = format!("{SMALL}\n[service.more]\nrun = \"x\"\ntick_hz = 1.0\npublishes.\"a\\nb\" = {{}}\n");
+    let problems = Manifest::parse("m.toml", &wired).unwrap().problems(&KNOWN);
+    assert!(problems.iter().any(|problem| problem.to_string().contains(r"a\nb")), "{problems:?}");
+    assert!(!problems.iter().any(|problem| problem.to_string().contains('\n')), "{problems:?}");
+}

@@ -165,3 +165,14 @@ fn the_thesis_vehicle_is_the_one_of_the_thesis() {
     assert_eq!((v.limits.height_m, v.flow), (Some(0.8), None));
     assert!((4.0 * v.motors.max_thrust_n / 9.806_65 - 3.8).abs() < 0.02, "kilograms of thrust");
 }
+
+#[test]
+fn names_can_be_shown() {
+    assert!(
+        refusal("name = \"front\"", "name = \"\"").contains("sonar.name = \"\": allowed is 1 to 32 bytes")
+    );
+    let said = refusal("name = \"front\"", r#"name = "a\nall is well""#);
+    assert!(said.contains(r#"sonar.name = "a\nall is well""#) && !said.contains('\n'), "{said}");
+    assert!(refusal("name = \"test\"", r#"name = "\u001b[2J""#).contains("name = \"\\u{1b}[2J\""));
+    assert!(refusal("name = \"test\"", r#""a\nb" = 1"#).chars().all(|c| !c.is_control()));
+}

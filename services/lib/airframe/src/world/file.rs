@@ -1,6 +1,7 @@
 //! World files: what stands in a building besides its plan.
 
 use super::solid::Surface;
+use manifest::plain;
 use serde::Deserialize;
 use thiserror::Error;
 
@@ -54,6 +55,9 @@ pub enum WorldError {
         what: String,
     },
 }
+
+/// Longest name, bytes: what a line of a report can show.
+const LONGEST_NAME: usize = 64;
 
 /// A world file: solids, tables, carpets, doors and people that stand in a planned building.
 /// Lengths are metres, angles degrees counter-clockwise, places in the plan frame.
@@ -224,13 +228,23 @@ impl WorldFile {
     pub fn parse(file: &str, text: &str) -> Result<Self, WorldError> {
         let mut world: Self = toml::from_str(text).map_err(|error| {
             let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
-            let message = error.message().replace('\n', " ");
+            let message = plain(&error.message().replace('\n', " "));
             let message = line.map_or(message.clone(), |line| format!("line {line}: {message}"));
             WorldError::Syntax { file: file.to_owned(), message }
         })?;
         world.check(file)?;
         file.clone_into(&mut world.file);
         Ok(world)
+    }
+
+    /// All names, each with the key that it stands under.
+    fn names(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        std::iter::once(("name", self.name.as_str()))
+            .chain(self.solid.iter().map(|solid| ("solid.name", solid.name.as_str())))
+            .chain(self.table.iter().map(|table| ("table.name", table.name.as_str())))
+            .chain(self.carpet.iter().map(|carpet| ("carpet.name", carpet.name.as_str())))
+            .chain(self.door.iter().map(|door| ("door.name", door.name.as_str())))
+            .chain(self.person.iter().map(|person| ("person.name", person.name.as_str())))
     }
 
     fn check(&self, file: &str) -> Result<(), WorldError> {
@@ -249,6 +263,13 @@ impl WorldFile {
         let size = |name: &str, key: &str, value: f32| {
             range(format!("{name}: {key}"), value, 0.01, 50.0, "0.01 to 50 m")
         };
+        self.names().try_for_each(|(field, name)| {
+            if name.len() <= LONGEST_NAME && !name.chars().any(char::is_control) {
+                return Ok(());
+            }
+            let (field, value) = (field.to_owned(), format!("{name:?}"));
+            Err(WorldError::Range { file: file.to_owned(), field, value, allowed: "up to 64 bytes of text" })
+        })?;
         if let Some(ceiling) = self.ceiling_m {
             range("ceiling_m".into(), ceiling, 1.8, 20.0, "1.8 to 20 m")?;
         }
@@ -350,5 +371,9 @@ mod tests {
         assert!(missing.contains("width_m is missing"), "{missing}");
         let fast = message("[[person]]\nname = \"Ana\"\nspeed_m_s = 9.0\nway = [[0.0, 0.0], [1.0, 0.0]]\n");
         assert!(fast.contains("0.5 to 1.4"), "{fast}");
+        let line = message(&good.replace("cabinet", "cabinet\\nall is well"));
+        assert!(line.contains("solid.name is \"cabinet\\nall is well\"; allowed: up to 64"), "{line}");
+        let key = message("\"\\u001b[2J\" = 1");
+        assert!(!key.chars().any(char::is_control), "{key:?}");
     }
 }
