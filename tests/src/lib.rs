@@ -1,6 +1,7 @@
 //! What the tests of the whole system share.
 
 pub mod counting;
+pub mod fuzz;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

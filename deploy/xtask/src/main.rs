@@ -1,5 +1,7 @@
-//! Build tasks: `cargo xtask demo`, `cargo xtask test` and `cargo xtask figures`.
+//! Build tasks: `cargo xtask demo`, `cargo xtask test`, `cargo xtask fuzz` and `cargo xtask figures`.
 #![allow(clippy::print_stdout, reason = "build tasks say what they do")]
+
+mod fuzz;
 
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
@@ -33,6 +35,14 @@ enum Task {
     },
     /// Run every test.
     Test,
+    /// Look for inputs that break what the decoders and loaders promise; every target when none is named.
+    Fuzz {
+        /// How long each target runs, seconds.
+        #[arg(long, default_value_t = 30)]
+        seconds: u64,
+        /// Files of `tests/fuzz/fuzz_targets` without their ending.
+        targets: Vec<String>,
+    },
     /// Draw the thesis's figures of chapter 3.1 again, into `docs/figures`.
     Figures,
 }
@@ -42,6 +52,9 @@ fn main() -> ExitCode {
     let done = match arguments.task {
         Task::Demo { once, seed, picture, kills } => demo(once, seed, &picture, kills),
         Task::Test => test(),
+        Task::Fuzz { seconds, targets } => {
+            checkout().and_then(|root| fuzz::fuzz(&root, seconds, &targets)).map(|()| ExitCode::SUCCESS)
+        }
         Task::Figures => figures(),
     };
     match done {
