@@ -9,6 +9,12 @@
 //!   file that somebody uploads must not write lines of its own there;
 //! - memory within a bound that the input's own length gives, or the largest plan: never what a header claims;
 //! - no number that came through is infinite or not a number.
+#![allow(
+    clippy::panic,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a target says what it has found by a panic"
+)]
 
 #[cfg(feature = "services")]
 mod config;

@@ -135,7 +135,7 @@ fn with_factory_settings_all_of_them_fall() {
         let lost = flights.iter().map(|f| f.lost);
         match firmware {
             Firmware::Betaflight2025_12 | Firmware::Betaflight2026_12 => {
-                all_within(name, lost, 0.158..=0.212)
+                all_within(name, lost, 0.158..=0.212);
             }
             Firmware::Betaflight4_5 | Firmware::Flip32 => all_within(name, lost, 0.108..=0.162),
             Firmware::Inav9_1 => never(name, lost),
