@@ -27,7 +27,7 @@ impl Companion {
             MspOverride::WhileFresh { stale_ns, .. } => stale_ns,
             MspOverride::Unknown | MspOverride::Held => u64::MAX,
         };
-        if self.heard_ns.is_none_or(|heard| now_ns - heard > pause_ns) {
+        if self.heard_ns.is_none_or(|heard| now_ns.saturating_sub(heard) > pause_ns) {
             self.steady_ns = now_ns;
         }
         self.heard_ns = Some(now_ns);
@@ -40,8 +40,8 @@ impl Companion {
             MspOverride::Unknown => false,
             MspOverride::Held => true,
             MspOverride::WhileFresh { stale_ns, steady_ns } => {
-                self.heard_ns.is_some_and(|heard| now_ns - heard <= stale_ns)
-                    && now_ns - self.steady_ns >= steady_ns
+                self.heard_ns.is_some_and(|heard| now_ns.saturating_sub(heard) <= stale_ns)
+                    && now_ns.saturating_sub(self.steady_ns) >= steady_ns
             }
         };
         used.then_some(self.sticks_us)
