@@ -2,6 +2,8 @@
 
 pub mod counting;
 pub mod fuzz;
+#[cfg(feature = "services")]
+pub mod scenarios;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! Build tasks: `cargo xtask demo`, `cargo xtask test`, `cargo xtask fuzz` and `cargo xtask figures`.
+//! Build tasks: `cargo xtask demo`, `cargo xtask test`, `cargo xtask scenarios`, `cargo xtask fuzz` and `cargo xtask figures`.
 #![allow(clippy::print_stdout, reason = "build tasks say what they do")]
 
 mod fuzz;
@@ -43,6 +43,12 @@ enum Task {
         /// Files of `tests/fuzz/fuzz_targets` without their ending.
         targets: Vec<String>,
     },
+    /// Fly faults as files: the scenarios of `tests/scenarios`.
+    Scenarios {
+        /// Names of scenarios, or their beginnings (all without any), and options: `--help` after `--` says which.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        order: Vec<String>,
+    },
     /// Draw the thesis's figures of chapter 3.1 again, into `docs/figures`.
     Figures,
 }
@@ -55,6 +61,7 @@ fn main() -> ExitCode {
         Task::Fuzz { seconds, targets } => {
             checkout().and_then(|root| fuzz::fuzz(&root, seconds, &targets)).map(|()| ExitCode::SUCCESS)
         }
+        Task::Scenarios { order } => scenarios(&order),
         Task::Figures => figures(),
     };
     match done {
@@ -122,6 +129,19 @@ fn test() -> Result<ExitCode> {
     build_programs(&root)?;
     cargo(&root, &["test", "--workspace", "--no-fail-fast"])?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The profile of the tests, which checks every overflow; progress and report are the program's own.
+fn scenarios(order: &[String]) -> Result<ExitCode> {
+    let root = checkout()?;
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let status = Command::new(cargo)
+        .args(["run", "--quiet", "--package", "sereno-tests", "--example", "scenarios", "--"])
+        .args(order)
+        .current_dir(&root)
+        .status()
+        .context("cannot run cargo")?;
+    Ok(if status.success() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn figures() -> Result<ExitCode> {

@@ -2,6 +2,7 @@
 
 use airframe::controller::{FailsafeSettings, Firmware};
 use airframe::radio::SafetyPilot;
+use airframe::simulation::faults::Fault;
 use airframe::simulation::{Options, StartPlace};
 use airframe::world::ClutterLevel;
 use runtime::{ConfigError, Validate, within};
@@ -30,6 +31,8 @@ pub struct Config {
     pub dead_sonars: Vec<String>,
     /// Once in flight the drone is suddenly so far from where it was, metres, and nothing on board has felt it; 0: never.
     pub displaced_m: f64,
+    /// What breaks in flight, and when; kinds and keys: [`Fault`].
+    pub faults: Vec<Fault>,
 }
 
 impl Default for Config {
@@ -45,6 +48,7 @@ impl Default for Config {
             charge: 1.0,
             dead_sonars: Vec::new(),
             displaced_m: 0.0,
+            faults: Vec::new(),
         }
     }
 }
@@ -156,6 +160,20 @@ mod tests {
         ] {
             let error = config.validate().unwrap_err().to_string();
             assert!(error.contains(word) && error.contains("allowed"), "{error}");
+        }
+    }
+    #[test]
+    fn a_fault_with_a_wrong_key_or_value_is_refused_with_its_file() {
+        let parse = |text: &str| runtime::parse_config::<Config>("simulator.toml", text);
+        let good = "[[faults]]\nkind = \"sonar-dead\"\nsonars = [\"down\"]\nfrom_s = 8\nuntil_s = 9\n";
+        assert_eq!(parse(good).unwrap().faults.len(), 1);
+        for (text, word) in [
+            (good.replace("until_s", "till_s"), "till_s"),
+            (good.replace("until_s = 9", "until_s = 7"), "until_s is 7; allowed: 8..="),
+            (good.replace("sonar-dead", "sonar-sleepy"), "sonar-sleepy"),
+        ] {
+            let error = parse(&text).unwrap_err().to_string();
+            assert!(error.contains(word) && error.contains("simulator.toml"), "{error}");
         }
     }
 }

@@ -50,6 +50,9 @@ impl Service for Simulator {
         }
         let options = config.options(&start.vehicle, start.seed)?;
         let world = build_world(&config, start)?;
+        let flight = Simulation::in_world(world, &start.vehicle, &options)
+            .with_faults(&config.faults, &start.vehicle, start.seed)
+            .map_err(StartError::invalid)?;
         let sensors = u32::try_from(start.vehicle.sonars.len()).unwrap_or(0);
         let mut controller = ports.device("controller")?;
         let mut flow = if ports.has_device("flow") { Some(ports.device("flow")?) } else { None };
@@ -59,7 +62,7 @@ impl Service for Simulator {
             let _ = flow.open();
         }
         Ok(Self {
-            flight: Simulation::in_world(world, &start.vehicle, &options),
+            flight,
             pings: ports.input()?,
             states: ports.input()?,
             echoes: ports.output()?,

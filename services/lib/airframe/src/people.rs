@@ -50,6 +50,8 @@ pub struct Person {
     standing: f32,
     halted: bool,
     waited: f32,
+    /// Of a visitor, who walks straight up to the drone: how near, metres.
+    up_to: Option<f32>,
 }
 
 impl Person {
@@ -62,7 +64,7 @@ impl Person {
     /// Whether the person has a step to make now, rather than standing.
     #[must_use]
     pub fn walks(&self) -> bool {
-        self.standing <= 0.0 && !self.halted && self.way.len() > 1
+        self.standing <= 0.0 && !self.halted && (self.up_to.is_some() || self.way.len() > 1)
     }
 
     /// The person as a solid: a coat, and soft.
@@ -90,7 +92,22 @@ impl Person {
         self.next();
     }
 
+    fn walk_up(&mut self, dt: f32, drone: (f32, f32), up_to: f32) {
+        let (dx, dy) = (drone.0 - self.x, drone.1 - self.y);
+        let away = dx.hypot(dy);
+        self.halted = away <= up_to;
+        if !self.halted {
+            let stride = (self.speed * dt).min(away - up_to);
+            self.x += dx / away * stride;
+            self.y += dy / away * stride;
+        }
+    }
+
     fn step(&mut self, dt: f32, drone: (f32, f32)) {
+        if let Some(up_to) = self.up_to {
+            self.walk_up(dt, drone, up_to);
+            return;
+        }
         if self.way.len() < 2 {
             return;
         }
@@ -173,6 +190,32 @@ impl Crowd {
         &self.people
     }
 
+    /// Somebody appears who walks straight up to the drone, as near as `up_to` (centre to centre, metres), and stays
+    /// with it. Nothing in the way is walked around.
+    pub(crate) fn enter(&mut self, name: &str, place: (f32, f32), speed: f32, up_to: f32) {
+        self.people.push(Person {
+            name: name.to_owned(),
+            x: place.0,
+            y: place.1,
+            height: 0.5 * (HEIGHT_M.0 + HEIGHT_M.1),
+            speed,
+            pause: 0.0,
+            way: Vec::new(),
+            circle: false,
+            target: 0,
+            forward: true,
+            standing: 0.0,
+            halted: false,
+            waited: 0.0,
+            up_to: Some(up_to),
+        });
+    }
+
+    /// Whoever has this name is gone.
+    pub(crate) fn leave(&mut self, name: &str) {
+        self.people.retain(|person| person.name != name);
+    }
+
     pub(crate) fn advance(&mut self, now_s: f64, drone: (f32, f32)) {
         // A clock that jumps (a pause in a debugger) must not teleport anybody far.
         self.now_s = self.now_s.max(now_s - 1.0);
@@ -212,6 +255,7 @@ fn person<R: Rng + ?Sized>(
         standing: 0.0,
         halted: false,
         waited: 0.0,
+        up_to: None,
     };
     person.next();
     Some(person)
@@ -236,7 +280,22 @@ mod tests {
             standing: 0.0,
             halted: false,
             waited: 0.0,
+            up_to: None,
         }
+    }
+
+    #[test]
+    fn a_visitor_walks_up_to_the_drone_and_stays_at_arms_length() {
+        let mut crowd = Crowd::default();
+        crowd.enter("guard", (4.0, 0.0), 1.0, 0.8);
+        let gap = |crowd: &Crowd, drone: f32| crowd.people[0].place().0 - drone;
+        (1..=100).for_each(|tick| crowd.advance(f64::from(tick) * 0.02, (0.0, 0.0)));
+        assert!((gap(&crowd, 0.0) - 2.0).abs() < 0.05, "{}", gap(&crowd, 0.0));
+        // The drone backs off by half a metre; the visitor comes after it.
+        (101..=300).for_each(|tick| crowd.advance(f64::from(tick) * 0.02, (-0.5, 0.0)));
+        assert!((gap(&crowd, -0.5) - 0.8).abs() < 0.01, "{}", gap(&crowd, -0.5));
+        crowd.leave("guard");
+        assert!(crowd.people().is_empty());
     }
 
     #[test]

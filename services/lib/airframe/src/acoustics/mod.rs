@@ -86,6 +86,11 @@ impl Echoes {
     pub fn as_slice(&self) -> &[Echo] {
         &self.echoes[..self.count.min(MAX_SENSORS)]
     }
+
+    /// The same, to be spoilt by faults.
+    pub(crate) fn as_mut_slice(&mut self) -> &mut [Echo] {
+        &mut self.echoes[..self.count.min(MAX_SENSORS)]
+    }
 }
 
 /// A sensor as it was built in, and what it did last.
@@ -194,6 +199,16 @@ impl Acoustics {
             }
         }
         range
+    }
+
+    /// Knocks a sensor: one that looks around turns about the vertical, one that looks down or up tilts forward, radians.
+    pub(crate) fn turn(&mut self, sensor: usize, angle_rad: f32) {
+        let Some(sensor) = self.sensors.get_mut(sensor) else { return };
+        if sensor.mount.elevation_rad.abs() > std::f32::consts::FRAC_PI_4 {
+            sensor.mount.elevation_rad += angle_rad;
+        } else {
+            sensor.mount.bearing_rad += angle_rad;
+        }
     }
 
     /// Where the sensors really look, body frame: what the flight drew.

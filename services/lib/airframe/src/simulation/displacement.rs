@@ -36,6 +36,11 @@ impl Displacement {
         })
     }
 
+    /// By `distance_m` as soon as it flies; in `direction_rad` (world frame) or the next one round that is free.
+    pub(super) fn at_once(distance_m: f64, direction_rad: f64) -> Self {
+        Self { distance_m, left_s: 0.0, direction_rad }
+    }
+
     /// Where to, when it is time.
     pub(super) fn due(
         &mut self,

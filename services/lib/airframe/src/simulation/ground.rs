@@ -49,6 +49,6 @@ impl GroundWatch {
     }
 
     pub(super) fn under_flow(&self) -> Ground {
-        Ground { surface_m: self.surface_m, soft: self.soft, moving: self.moving }
+        Ground { surface_m: self.surface_m, soft: self.soft, moving: self.moving, contrast: 1.0 }
     }
 }

@@ -4,7 +4,9 @@
 //! the sonars and for the flow sensor: asking one sensor more often does not change what another one sees.
 
 mod displacement;
+pub mod faults;
 mod ground;
+mod mishap;
 mod safety;
 mod touch;
 
@@ -15,13 +17,16 @@ use crate::acoustics::{Acoustics, Echo, Echoes, GIVE_UP_S, Mount, Pose6};
 use crate::controller::{Controller, FailsafeSettings, Firmware, Senses};
 use crate::radio::SafetyPilot;
 use crate::vehicle::{
-    Compass, FlowSensor, FlowSettings, Inertial, Quadrotor, Shape, Surroundings, Variation, normal, within,
+    Compass, FlowSensor, FlowSettings, Ground, Inertial, Quadrotor, Shape, Surroundings, Variation, normal,
+    within,
 };
 use crate::world::draw::stream;
 use crate::world::{ClutterLevel, PadPlace, World, WorldError, WorldFile};
 use displacement::Displacement;
+use faults::{Effects, Faults};
 use floorplan::{Plan, Sidecar};
 use ground::GroundWatch;
+use mishap::Power;
 use nalgebra::Vector3;
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
@@ -188,6 +193,10 @@ pub struct Simulation {
     dead_sonars: u32,
     answers: VecDeque<PingAnswer>,
     displacement: Option<Displacement>,
+    /// `None` on a flight without faults, which is nearly every one.
+    faults: Option<Box<Faults>>,
+    effects: Effects,
+    power: Power,
 }
 
 impl Simulation {
@@ -281,6 +290,9 @@ impl Simulation {
             dead_sonars: options.dead_sonars,
             answers: VecDeque::with_capacity(ECHOES),
             displacement: Displacement::draw(options.displaced_m, &mut stream(options.seed, DISPLACEMENT)),
+            faults: None,
+            effects: Effects::default(),
+            power: Power::default(),
         }
     }
 
@@ -295,17 +307,22 @@ impl Simulation {
         if self.step.is_multiple_of(SLOW_STEPS) && self.radio.is_some() {
             self.radio_sends();
         }
+        if self.faults.is_some() {
+            self.suffer();
+        }
+        let powered = self.is_powered();
         let random = &mut self.motion_random;
         if self.step.is_multiple_of(SLOW_STEPS) {
             let motion = self.craft.motion();
             let (x, y) = (motion.position.x, motion.position.y);
             self.world.advance(self.now_ns as f64 * 1e-9, (x as f32, y as f32));
             self.wall_m = f64::from(self.world.wall_distance(x as f32, y as f32));
-            self.senses.heading_rad = self.compass.read(x, y, motion.angles().2, random);
+            let heading = self.compass.read(x, y, motion.angles().2, random);
+            self.senses.heading_rad = heading + self.effects.compass_rad;
             let battery = self.craft.battery();
             self.senses.volts = battery.volts() + VOLTS_NOISE * normal(random);
             self.senses.amps = battery.amps() * (1.0 + AMPS_NOISE * normal(random));
-            self.senses.drawn_mah = battery.drawn_mah();
+            self.senses.drawn_mah = battery.drawn_mah() - self.power.uncounted_mah;
         }
         if let Some(displacement) = &mut self.displacement
             && let Some((x, y)) = displacement.due(&self.world, &self.craft, self.touch.on_ground(), STEP_S)
@@ -320,7 +337,11 @@ impl Simulation {
         (self.senses.gyro, self.senses.accelerometer) =
             self.inertial.sample(self.craft.motion(), shake, random);
         self.senses.gyro.z *= self.turn_scale;
-        let commands = self.controller.step(self.now_ns, STEP_S, &self.senses);
+        let commands = if powered {
+            self.controller.step(self.now_ns - self.power.since_ns, STEP_S, &self.senses)
+        } else {
+            [0.0; 4]
+        };
 
         self.ground.look(&self.world, &self.craft, self.step);
         self.touch.look(&self.world, &self.craft, self.ground.surface_m(), self.step);
@@ -328,7 +349,7 @@ impl Simulation {
             Surroundings { surface_m: self.ground.surface_m(), wall_m: self.wall_m, push: self.touch.push() };
         self.craft.step(STEP_S, &commands, &around, random);
         if let Some(flow) = &mut self.flow {
-            let ground = self.ground.under_flow();
+            let ground = Ground { contrast: self.effects.flow_contrast, ..self.ground.under_flow() };
             flow.step(self.now_ns, STEP_S, self.craft.motion(), &ground, &mut self.flow_random);
         }
     }
@@ -341,23 +362,32 @@ impl Simulation {
 
     /// Bytes onto the serial line to the flight controller, from now on.
     pub fn controller_write(&mut self, bytes: &[u8]) {
-        self.controller.write(self.now_ns, bytes);
+        let troubled = self.faults.as_mut().is_some_and(|faults| faults.send(self.now_ns, bytes));
+        if !troubled && self.is_powered() {
+            self.controller.write(self.now_ns - self.power.since_ns, bytes);
+        }
     }
 
     /// Bytes that have come over the serial line from the flight controller.
     pub fn controller_read(&mut self, out: &mut [u8]) -> usize {
-        self.controller.read(self.now_ns, out)
+        let troubled = self.faults.as_ref().is_some_and(|faults| faults.listens());
+        if troubled { self.hear_troubled(out) } else { self.hear(out) }
     }
 
     /// Bytes that have come over the serial line of the flow sensor; none without one.
     pub fn flow_read(&mut self, out: &mut [u8]) -> usize {
-        self.flow.as_mut().map_or(0, |flow| flow.read(self.now_ns, out))
+        let count = self.flow.as_mut().map_or(0, |flow| flow.read(self.now_ns, out));
+        if self.effects.flow_silent { 0 } else { count }
     }
 
     /// Fires the sonars whose bit is set; the answer is ready when the last echo pulse has ended.
     pub fn ping(&mut self, mask: u32, ping: u32) {
         let pose = self.pose();
-        let echoes = self.acoustics.ping(&self.world, &pose, mask, self.now_ns, &mut self.sonar_random);
+        let mut echoes = self.acoustics.ping(&self.world, &pose, mask, self.now_ns, &mut self.sonar_random);
+        let mut dead = self.dead_sonars;
+        if let Some(faults) = &mut self.faults {
+            dead |= faults.spoil(echoes.as_mut_slice());
+        }
         let longest = echoes
             .as_slice()
             .iter()
@@ -370,7 +400,7 @@ impl Simulation {
             ping,
             ping_ns: self.now_ns,
             ready_ns: self.now_ns + (f64::from(longest) * 1e9) as u64,
-            dead: self.dead_sonars,
+            dead,
             echoes,
         });
     }
@@ -413,7 +443,7 @@ impl Simulation {
             volts: self.craft.battery().volts() as f32,
             charge: self.craft.battery().charge() as f32,
             contacts: self.touch.contacts(),
-            armed: self.controller.is_armed(),
+            armed: self.is_powered() && self.controller.is_armed(),
             on_ground: self.touch.on_ground(),
         }
     }

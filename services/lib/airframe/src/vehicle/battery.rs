@@ -36,6 +36,16 @@ pub struct Battery {
     charge: f64,
     volts: f64,
     amps: f64,
+    wear: Wear,
+}
+
+/// What has gone wrong with a pack.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wear {
+    /// Resistance on top of the pack's own: an old pack, a loose plug, ohm.
+    pub extra_ohm: f64,
+    /// Cells that give nothing any more.
+    pub lost_cells: u32,
 }
 
 impl Battery {
@@ -43,15 +53,15 @@ impl Battery {
     #[must_use]
     pub fn new(pack: Pack) -> Self {
         let volts = f64::from(pack.cells) * pack.full_cell_v;
-        Self { pack, charge: 1.0, volts, amps: 0.0 }
+        Self { pack, charge: 1.0, volts, amps: 0.0, wear: Wear::default() }
     }
 
     /// Draws `watts` for `dt` seconds.
     pub fn draw(&mut self, watts: f64, dt: f64) {
-        let open = f64::from(self.pack.cells) * self.open_cell_volts();
+        let open = f64::from(self.pack.cells.saturating_sub(self.wear.lost_cells)) * self.open_cell_volts();
         // The current follows the voltage of the step before: one millisecond late, no equation to solve.
         self.amps = watts / self.volts.max(1.0);
-        self.volts = (open - self.amps * self.pack.resistance_ohm).max(1.0);
+        self.volts = (open - self.amps * (self.pack.resistance_ohm + self.wear.extra_ohm)).max(1.0);
         let drawn_mah = self.amps * dt / 3.6;
         self.charge = (self.charge - drawn_mah / self.pack.capacity_mah).max(0.0);
     }
@@ -90,6 +100,14 @@ impl Battery {
         self.charge = charge.clamp(0.0, 1.0);
         self.volts = f64::from(self.pack.cells) * self.open_cell_volts();
     }
+    /// Goes on with what has gone wrong.
+    pub(crate) fn set_wear(&mut self, wear: Wear) {
+        self.wear = wear;
+    }
+    /// What is left sinks to `charge`, if there was more: cells that held less than their label says.
+    pub(crate) fn sink_to(&mut self, charge: f64) {
+        self.charge = self.charge.min(charge.clamp(0.0, 1.0));
+    }
     /// Milliampere-hours drawn since full.
     #[must_use]
     pub fn drawn_mah(&self) -> f64 {
@@ -121,5 +139,21 @@ mod tests {
             battery.draw(160.0, 0.001);
         }
         assert!(battery.charge() <= 0.0 && battery.volts() > 0.0 && battery.volts() < 12.0);
+    }
+    #[test]
+    fn a_worn_pack_sags_deeper_and_a_lost_cell_takes_its_share() {
+        let pack = Pack { cells: 4, capacity_mah: 1000.0, resistance_ohm: 0.05, full_cell_v: 4.2 };
+        let volts = |wear| {
+            let mut battery = Battery::new(pack);
+            battery.set_wear(wear);
+            (0..100).for_each(|_| battery.draw(100.0, 0.001));
+            battery.volts()
+        };
+        let sound = volts(Wear::default());
+        // 100 W are about 6 A, which lose 0.6 V in 0.1 ohm; a full cell has 4.2 V.
+        let sagging = sound - volts(Wear { extra_ohm: 0.1, lost_cells: 0 });
+        assert!((0.5..0.8).contains(&sagging), "{sagging}");
+        let short = sound - volts(Wear { extra_ohm: 0.0, lost_cells: 1 });
+        assert!((4.2..4.5).contains(&short), "{short}");
     }
 }

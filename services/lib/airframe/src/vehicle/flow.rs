@@ -84,6 +84,8 @@ pub struct Ground {
     pub soft: bool,
     /// Something walks through the picture.
     pub moving: bool,
+    /// What a dirty lens or a dark floor leaves of the contrast, 1: all.
+    pub contrast: f64,
 }
 
 /// The sensor in flight.
@@ -194,7 +196,7 @@ impl FlowSensor {
     fn contrast(&self, motion: &Motion, ground: &Ground) -> f64 {
         let (x, y) = (motion.position.x, motion.position.y);
         let sum: f64 = self.texture.iter().map(|(kx, ky, phase)| (kx * x + ky * y + phase).sin()).sum();
-        let mut contrast = if sum / 3.0 > BARE_ABOVE { 0.2 } else { 1.0 };
+        let mut contrast = if sum / 3.0 > BARE_ABOVE { 0.2 } else { 1.0 } * ground.contrast;
         if ground.soft {
             contrast *= SOFT_CONTRAST;
         }

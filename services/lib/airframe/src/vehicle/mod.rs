@@ -12,7 +12,7 @@ mod imu;
 mod noise;
 mod shape;
 
-pub use battery::{Battery, Pack};
+pub use battery::{Battery, Pack, Wear};
 pub use compass::Compass;
 pub use contact::{Push, TOUCH_LIMIT_M_S, TOUCH_LIMIT_RAD};
 pub use flow::{FlowSensor, FlowSettings, Ground, MSP2_SENSOR_OPTIC_FLOW, MSP2_SENSOR_RANGEFINDER};
@@ -103,6 +103,10 @@ pub struct Quadrotor {
     gust: Gust,
     steps: u32,
     touching: bool,
+    /// Share of its thrust that each motor still gives.
+    motor_shares: [f64; 4],
+    /// Wind on top of the gusts, world frame, m/s^2.
+    wind: Option<Vector3<f64>>,
 }
 
 impl Quadrotor {
@@ -124,7 +128,19 @@ impl Quadrotor {
             gust: Gust::default(),
             steps: 0,
             touching: true,
+            motor_shares: [1.0; 4],
+            wind: None,
         }
+    }
+
+    /// Goes on with motors that give these shares of their thrust.
+    pub(crate) fn set_motor_shares(&mut self, shares: [f64; 4]) {
+        self.motor_shares = shares;
+    }
+
+    /// Goes on in a wind, world frame, m/s^2.
+    pub(crate) fn set_wind(&mut self, wind: Option<Vector3<f64>>) {
+        self.wind = wind;
     }
 
     /// Takes it as it flies to another place, metres: what no sensor of motion feels.
@@ -206,7 +222,7 @@ impl Quadrotor {
             let before = self.speeds[i];
             let speed = wanted + (before - wanted) * keep;
             self.speeds[i] = speed;
-            let plain = shape.max_thrust_n[i] * speed * speed;
+            let plain = shape.max_thrust_n[i] * self.motor_shares[i] * speed * speed;
             let force = plain * cushion * inflow;
             thrust += force;
             let (x, y) = shape.motor_place[i];
@@ -236,6 +252,9 @@ impl Quadrotor {
         let airborne = if self.touching { 0.1 } else { 1.0 };
         acceleration += self.gust.acceleration() * airborne;
         angular += self.gust.angular_acceleration() * airborne;
+        if let Some(wind) = self.wind {
+            acceleration += wind * airborne;
+        }
 
         let (push, twist, touching) = contact::react(shape, &self.motion, &body, around);
         self.touching = touching;

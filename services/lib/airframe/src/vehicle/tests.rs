@@ -110,7 +110,7 @@ fn a_crash_tumbles_and_does_not_explode() {
 #[test]
 fn flow_is_unbiased_and_has_the_documented_signs() {
     let settings = FlowSettings::from(&vehicle().flow.expect("watchman has a flow sensor"));
-    let ground = Ground { surface_m: 0.0, soft: false, moving: false };
+    let ground = Ground { surface_m: 0.0, soft: false, moving: false, contrast: 1.0 };
     let decode = |velocity: Vector3<f64>, rates: Vector3<f64>| {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut sensor = FlowSensor::exact(settings);

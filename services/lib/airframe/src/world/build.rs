@@ -108,8 +108,7 @@ impl World {
         }
         clutter::shut_doors(&mut doors, level, &mut rng);
         for door in doors.iter().filter(|d| d.shut) {
-            let size = (door.width + 0.02, LEAF_THICKNESS_M);
-            let leaf = Solid::new_box(door.middle, size, door.heading, 0.0, lintel);
+            let leaf = leaf(door, lintel);
             let piece = Piece { name: door.name.clone(), parts: vec![leaf], outline: leaf };
             add_piece(piece, Role::Door, &mut solids, &mut objects, &mut ground);
         }
@@ -121,8 +120,7 @@ impl World {
             ox + plan.width() as f32 * plan.resolution(),
             oy + plan.height() as f32 * plan.resolution(),
         ];
-        // Bending moves walls out of the plan's frame by centimetres.
-        let wide = [bounds[0] - 1.0, bounds[1] - 1.0, bounds[2] + 1.0, bounds[3] + 1.0];
+        let wide = wide(bounds);
         let solid_index = Index::of_solids(wide, &solids);
         let edge_index = Index::new(wide, edges.iter().map(|e| [e.x, e.y, e.x, e.y]));
         let flight_distance = ground.flight_distances();
@@ -131,6 +129,7 @@ impl World {
             name: file.name.clone(),
             pad,
             ceiling,
+            lintel,
             built,
             bounds,
             walls,
@@ -145,6 +144,40 @@ impl World {
             crowd,
         })
     }
+}
+
+impl World {
+    /// Shuts or opens a door of the plan while the world goes on; false when there is none of this name. Where people
+    /// walk and how gusts feel the walls stays as it was when the world was built.
+    pub(crate) fn set_door(&mut self, name: &str, shut: bool) -> bool {
+        let Some(door) = self.doors.iter_mut().find(|door| door.name == name) else { return false };
+        if door.shut == shut {
+            return true;
+        }
+        door.shut = shut;
+        let leaf = leaf(door, self.lintel);
+        if shut {
+            let object = u16::try_from(self.objects.len()).unwrap_or(NO_OBJECT);
+            let leaf = Solid { object, ..leaf.with_role(Role::Door) };
+            self.solids.push(leaf);
+            self.objects.push(Object { name: name.to_owned(), outline: leaf });
+        } else {
+            // Names of objects stay: solids point at them by number.
+            self.solids.retain(|solid| solid.role != Role::Door || (solid.x, solid.y) != (leaf.x, leaf.y));
+        }
+        self.solid_index = Index::of_solids(wide(self.bounds), &self.solids);
+        true
+    }
+}
+
+/// The leaf of a shut door.
+fn leaf(door: &DoorPlace, lintel: f32) -> Solid {
+    Solid::new_box(door.middle, (door.width + 0.02, LEAF_THICKNESS_M), door.heading, 0.0, lintel)
+}
+
+/// Bounds for an index: bending moves walls out of the plan's frame by centimetres.
+fn wide(bounds: [f32; 4]) -> [f32; 4] {
+    [bounds[0] - 1.0, bounds[1] - 1.0, bounds[2] + 1.0, bounds[3] + 1.0]
 }
 
 fn pad_place(side: &Sidecar, file: &WorldFile, built: &AsBuilt) -> Result<PadPlace, WorldError> {

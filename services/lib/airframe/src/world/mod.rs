@@ -106,6 +106,7 @@ pub struct World {
     name: String,
     pad: PadPlace,
     ceiling: f32,
+    lintel: f32,
     built: AsBuilt,
     bounds: [f32; 4],
     walls: Walls,
@@ -171,6 +172,10 @@ impl World {
     #[must_use]
     pub fn people(&self) -> &Crowd {
         &self.crowd
+    }
+    /// Those who walk, for whoever lets somebody in.
+    pub(crate) fn people_mut(&mut self) -> &mut Crowd {
+        &mut self.crowd
     }
     /// Moves the people on to `now_s`, seconds since the world began; `drone` is where the drone is while it
     /// flies or stands, world frame.
