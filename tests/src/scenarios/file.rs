@@ -248,7 +248,7 @@ impl Scenario {
 impl Expectation {
     fn check(&self) -> Result<()> {
         for failsafe in &self.failsafes {
-            let known = failsafe.split_once(": ").is_some_and(|(cause, action)| {
+            let known = failsafe.rsplit_once(": ").is_some_and(|(cause, action)| {
                 FailsafeCause::ALL.iter().any(|known| known.word() == cause) && action_of(action).is_some()
             });
             ensure!(known, "failsafes: there is no \"{failsafe}\"; one is \"height unknown: descend\"");
