@@ -5,6 +5,7 @@ use floorplan::{
     Cell, DistanceField, MAX_CELLS, MAX_ROOMS, MAX_SIDE, Plan, PlanHeader, Rooms, Sidecar, widest_place,
 };
 use std::collections::BTreeSet;
+use std::sync::LazyLock;
 
 /// Memory that a cell may cost while a plan is loaded: two decoded pictures of it (16-bit colour and transparency, 8
 /// bytes, and shades, 2 bytes) and a little, or the directions of its surface (12 bytes) with what is kept.
@@ -12,7 +13,7 @@ const CELL_MEMORY: usize = 20;
 /// The decoders' own: windows, tables, and buffers for chunks that they do not keep.
 const DECODER_MEMORY: usize = 1024 * 1024;
 /// Every question is asked of plans up to this many cells, so that a search asks many plans.
-const LITTLE_PLAN: usize = 20_000;
+const LITTLE_PLAN: usize = 4_000;
 
 /// A header's yaml, [`super::BETWEEN`], a picture's bytes.
 ///
@@ -78,7 +79,10 @@ fn questions(plan: &Plan) {
     }
 }
 
-/// Ten by eight metres with one wall and a door in it: what a sidecar is laid over.
+/// What a sidecar is laid over.
+static BUILDING: LazyLock<Plan> = LazyLock::new(building);
+
+/// Ten by eight metres with one wall and a door in it.
 fn building() -> Plan {
     let mut rows = vec![format!("#{}#", " ".repeat(38)); 32];
     rows[0] = "#".repeat(40);
@@ -121,8 +125,8 @@ pub fn sidecar(data: &[u8]) -> bool {
         assert!(x.is_finite() && y.is_finite());
         assert!(!room.area.contains(f32::NAN, y) && !room.area.contains(x, 2e4));
     }
-    let plan = building();
-    match Rooms::of(FILE, &sidecar, &plan) {
+    let plan = &*BUILDING;
+    match Rooms::of(FILE, &sidecar, plan) {
         Ok(rooms) => {
             assert!(!rooms.is_empty() && rooms.len() <= MAX_ROOMS);
             let known = (0..plan.cells().len())
@@ -139,7 +143,7 @@ pub fn sidecar(data: &[u8]) -> bool {
     }
     if let Some(pad) = &sidecar.pad {
         // Refused or not, without a panic: the place may be anywhere.
-        let _ = plan.check_pad(&DistanceField::new(&plan, 2.0), pad.x, pad.y, 0.3);
+        let _ = plan.check_pad(&DistanceField::new(plan, 2.0), pad.x, pad.y, 0.3);
     }
     true
 }
