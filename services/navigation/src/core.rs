@@ -1,5 +1,6 @@
 //! Everything but the ports: from places, echoes, commands and the pilot's state to a setpoint.
 
+mod astray;
 mod follow;
 
 use crate::aside::Courtesy;
@@ -148,21 +149,6 @@ impl Core {
         }
     }
 
-    /// What was noted in the plan's frame lies elsewhere now: the grid begins anew, and so does the way.
-    fn jump(&mut self, place: &Place) {
-        self.frame_ns = place.stamp_ns;
-        self.beams.clear();
-        self.explore.forget();
-        self.steering.forget();
-        self.blockage.reset();
-        self.courtesy.forget();
-        self.stand = None;
-        self.mission.replanning(place);
-        if self.mission.goal() != Goal::None {
-            self.journey.plan();
-        }
-    }
-
     /// Echoes: kept until the next decision.
     pub fn ranges(&mut self, ranges: &SonarRanges) {
         if ranges.count as usize > ranges.readings.len() {
@@ -288,21 +274,6 @@ impl Core {
         };
         write_polar(polar, steer.as_ref().map(|(steer, seeing)| (steer, *seeing)));
         self.say(intent, steer.is_some_and(|(_, seeing)| seeing));
-        setpoint
-    }
-
-    /// A setpoint while nobody knows where on the plan the drone is.
-    fn search(&mut self, now: u64, dt_s: f32, place: &Place, grid: Option<&Grid>) -> Setpoint {
-        let mut setpoint = blank_setpoint(now, &self.config);
-        let window = grid.and_then(|grid| Window::from_origin(grid.origin_x_m, grid.origin_y_m));
-        if let (Some(grid), Some(window), true) = (grid, window, self.mission.heeded()) {
-            let radius = self.steering.craft().radius_m;
-            let wish = self.explore.step(now, dt_s, place, &grid.cells, &window, radius);
-            setpoint.kind = u32::from(SetpointKind::Velocity.code());
-            (setpoint.velocity_x_m_s, setpoint.velocity_y_m_s) = wish.velocity;
-            setpoint.heading_rad = wish.heading;
-        }
-        self.text = Text::new("looking for the drone's place on the plan");
         setpoint
     }
 

@@ -7,31 +7,35 @@ mod displacement;
 pub mod faults;
 mod ground;
 mod mishap;
+mod options;
 mod safety;
 mod touch;
+mod truth;
 
 #[cfg(test)]
 mod tests;
 
 use crate::acoustics::{Acoustics, Echo, Echoes, GIVE_UP_S, Mount, Pose6};
-use crate::controller::{Controller, FailsafeSettings, Firmware, Senses};
+use crate::controller::{Controller, Senses};
 use crate::radio::SafetyPilot;
 use crate::vehicle::{
     Compass, FlowSensor, FlowSettings, Ground, Inertial, Quadrotor, Shape, Surroundings, Variation, normal,
     within,
 };
 use crate::world::draw::stream;
-use crate::world::{ClutterLevel, PadPlace, World, WorldError, WorldFile};
+use crate::world::{PadPlace, World, WorldError, WorldFile};
 use displacement::Displacement;
 use faults::{Effects, Faults};
 use floorplan::{Plan, Sidecar};
 use ground::GroundWatch;
 use mishap::Power;
 use nalgebra::Vector3;
+pub use options::{Options, StartPlace};
 use rand::RngExt;
 use rand::rngs::Xoshiro256PlusPlus;
 use std::collections::VecDeque;
 use touch::Touch;
+pub use truth::TruthState;
 
 /// One step of physics and of the flight controller's loops.
 pub const STEP_NS: u64 = 1_000_000;
@@ -58,94 +62,6 @@ const GYRO: u64 = 106;
 /// Scale error of a gyro that turns a heading without compass: the tolerance of the MPU-6000 family's data sheet, 3 %.
 const GYRO_SCALE: f64 = 0.03;
 const DISPLACEMENT: u64 = 107;
-
-/// Where the drone stands when the flight begins.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum StartPlace {
-    /// On the pad, as its heading says.
-    #[default]
-    Pad,
-    /// Somewhere on free floor that can be flown to from the pad, any heading.
-    Room,
-}
-
-/// What one flight is made of besides plan, world file and vehicle.
-#[derive(Clone, Copy, Debug)]
-pub struct Options {
-    /// Unmapped things, shut doors, people.
-    pub clutter: ClutterLevel,
-    /// Of everything.
-    pub seed: u64,
-    /// Which firmware the flight controller plays.
-    pub firmware: Firmware,
-    /// Whether the flight controller has a magnetometer. Without, its heading begins at the compass's arbitrary zero and
-    /// then drifts with the gyro's bias (up to 2.75 degrees a minute) and scale.
-    pub magnetometer: bool,
-    /// A radio as its receiver, with MSP frames beside it, and who holds the radio; otherwise MSP is the receiver.
-    pub radio: Option<SafetyPilot>,
-    /// How its failsafe is set.
-    pub failsafe: FailsafeSettings,
-    /// Where the drone stands at first.
-    pub start: StartPlace,
-    /// Share of the battery's charge at the start.
-    pub charge: f64,
-    /// Sonars that never answer: bit = index in the vehicle's list.
-    pub dead_sonars: u32,
-    /// Carried off once in flight by so much, metres; 0: never.
-    pub displaced_m: f64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            clutter: ClutterLevel::Full,
-            seed: 0,
-            firmware: Firmware::default(),
-            magnetometer: true,
-            radio: None,
-            failsafe: FailsafeSettings::default(),
-            start: StartPlace::default(),
-            charge: 1.0,
-            dead_sonars: 0,
-            displaced_m: 0.0,
-        }
-    }
-}
-
-/// The truth of one moment; see `sim/truth` for the fields' meaning.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TruthState {
-    /// Seconds since the flight began.
-    pub time_s: f64,
-    /// World frame, centre of mass, metres.
-    pub x_m: f32,
-    /// World frame, centre of mass, metres.
-    pub y_m: f32,
-    /// Lowest point of the airframe above the floor, metres.
-    pub z_m: f32,
-    /// Right side down positive.
-    pub roll_rad: f32,
-    /// Nose down positive.
-    pub pitch_rad: f32,
-    /// Counter-clockwise from world x.
-    pub yaw_rad: f32,
-    /// World frame.
-    pub velocity_m_s: [f32; 3],
-    /// Airframe's cylinder to the nearest solid; negative when inside; at most 1.5 m.
-    pub clearance_m: f32,
-    /// Smallest clearance so far while airborne; 1.5 m before the first take-off.
-    pub min_clearance_m: f32,
-    /// At the battery's terminals.
-    pub volts: f32,
-    /// Share of the charge left.
-    pub charge: f32,
-    /// Touches so far.
-    pub contacts: u32,
-    /// The controller is armed.
-    pub armed: bool,
-    /// Feet or rim touch a surface.
-    pub on_ground: bool,
-}
 
 /// What one ping group brought back.
 #[derive(Clone, Copy, Debug)]
@@ -421,30 +337,6 @@ impl Simulation {
             roll: roll as f32,
             pitch: pitch as f32,
             yaw: yaw as f32,
-        }
-    }
-
-    /// The truth now.
-    #[must_use]
-    pub fn truth(&self) -> TruthState {
-        let motion = self.craft.motion();
-        let (roll, pitch, yaw) = motion.angles();
-        TruthState {
-            time_s: self.now_ns as f64 * 1e-9,
-            x_m: motion.position.x as f32,
-            y_m: motion.position.y as f32,
-            z_m: self.craft.lowest_m() as f32,
-            roll_rad: roll as f32,
-            pitch_rad: pitch as f32,
-            yaw_rad: yaw as f32,
-            velocity_m_s: [motion.velocity.x as f32, motion.velocity.y as f32, motion.velocity.z as f32],
-            clearance_m: self.touch.clearance_m(),
-            min_clearance_m: self.touch.min_clearance_m(),
-            volts: self.craft.battery().volts() as f32,
-            charge: self.craft.battery().charge() as f32,
-            contacts: self.touch.contacts(),
-            armed: self.is_powered() && self.controller.is_armed(),
-            on_ground: self.touch.on_ground(),
         }
     }
 

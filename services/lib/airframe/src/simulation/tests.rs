@@ -1,6 +1,7 @@
 use super::*;
 use crate::controller::BYTE_NS;
 use crate::world::AsBuilt;
+use crate::world::ClutterLevel;
 use std::f32::consts::FRAC_PI_2;
 
 /// 8 m by 6 m, empty; 20 cm a cell.

@@ -10,9 +10,11 @@
 //! The work is done in slices of so many look-ups, so that it never delays a setpoint. Nothing is allocated after
 //! [`Search::new`].
 
+mod lattice;
 mod tables;
 mod trail;
 
+pub use lattice::Lattice;
 pub use trail::{MAX_HEARD, Trail, TrailPose};
 
 use crate::SonarConfig;
@@ -20,14 +22,11 @@ use crate::map::RangeMap;
 use crate::maths::wrap_angle;
 use core::cmp::{Ordering, Reverse};
 use core::f32::consts::TAU;
-use floorplan::{Cell, DistanceField, Plan};
 use std::collections::BinaryHeap;
 use std::sync::Arc;
 use tables::{Columns, Tables};
 use trail::Heard;
 
-/// Side of the lattice, metres.
-const LATTICE_M: f32 = 0.2;
 /// Headings a turn.
 const TURNS: usize = 72;
 /// Half a step of the lattice in both directions, and half a step of the headings: what the nearest lattice point is off by.
@@ -128,32 +127,6 @@ enum Stage {
     /// Next mode.
     Improve(usize),
     Done,
-}
-
-/// The places of a plan that are looked at: those with room for a body.
-#[derive(Debug)]
-pub struct Lattice(Vec<(f32, f32)>);
-
-impl Lattice {
-    /// Of `plan`, for a body that keeps `clearance_m` from what is not free.
-    #[must_use]
-    pub fn new(plan: &Plan, clearance_m: f32) -> Self {
-        let field = DistanceField::of_not_free(plan, clearance_m + 1.0);
-        let step = (LATTICE_M / plan.resolution()).round().max(1.0) as usize;
-        let places = (step / 2..plan.height())
-            .step_by(step)
-            .flat_map(|iy| (step / 2..plan.width()).step_by(step).map(move |ix| (ix, iy)))
-            .filter(|(ix, iy)| plan.cell(*ix, *iy) == Cell::Free && field.at_cell(*ix, *iy) >= clearance_m)
-            .map(|(ix, iy)| plan.centre(ix, iy))
-            .collect();
-        Self(places)
-    }
-
-    /// Plan frame, metres.
-    #[must_use]
-    pub fn places(&self) -> &[(f32, f32)] {
-        &self.0
-    }
 }
 
 /// The search: the lattice of a plan, and room to work in.
@@ -270,7 +243,7 @@ impl Search {
             match self.stage {
                 Stage::Idle | Stage::Done => return false,
                 Stage::Lattice(next) => {
-                    let Some((x, y)) = self.lattice.0.get(next).copied() else {
+                    let Some((x, y)) = self.lattice.places().get(next).copied() else {
                         self.choose();
                         self.stage = Stage::Improve(0);
                         continue;
@@ -328,7 +301,7 @@ impl Search {
             if self.modes.len() >= MODES {
                 break;
             }
-            let (x, y) = self.lattice.0[candidate.place as usize];
+            let (x, y) = self.lattice.places()[candidate.place as usize];
             let mode = Mode {
                 x,
                 y,
