@@ -4,6 +4,8 @@ pub mod counting;
 pub mod fuzz;
 #[cfg(feature = "services")]
 pub mod scenarios;
+#[cfg(feature = "services")]
+pub mod streams;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

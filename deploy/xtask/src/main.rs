@@ -1,4 +1,4 @@
-//! Build tasks: `cargo xtask demo`, `cargo xtask test`, `cargo xtask scenarios`, `cargo xtask fuzz` and `cargo xtask figures`.
+//! Build tasks: `cargo xtask demo`, `cargo xtask test`, `cargo xtask scenarios`, `cargo xtask streams`, `cargo xtask fuzz` and `cargo xtask figures`.
 #![allow(clippy::print_stdout, reason = "build tasks say what they do")]
 
 mod fuzz;
@@ -49,6 +49,12 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         order: Vec<String>,
     },
+    /// Fly random command streams against the shield.
+    Streams {
+        /// Options: `--help` after `--` says which.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        order: Vec<String>,
+    },
     /// Draw the thesis's figures of chapter 3.1 again, into `docs/figures`.
     Figures,
 }
@@ -61,7 +67,8 @@ fn main() -> ExitCode {
         Task::Fuzz { seconds, targets } => {
             checkout().and_then(|root| fuzz::fuzz(&root, seconds, &targets)).map(|()| ExitCode::SUCCESS)
         }
-        Task::Scenarios { order } => scenarios(&order),
+        Task::Scenarios { order } => example("scenarios", &[], &order),
+        Task::Streams { order } => example("streams", &["--release"], &order),
         Task::Figures => figures(),
     };
     match done {
@@ -131,12 +138,15 @@ fn test() -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The profile of the tests, which checks every overflow; progress and report are the program's own.
-fn scenarios(order: &[String]) -> Result<ExitCode> {
+/// Runs a program of the system's tests. Scenarios are flown in the profile of the tests, which checks every overflow, and
+/// streams, of which there are many, as the system is flown. Progress and report are the program's own.
+fn example(name: &str, profile: &[&str], order: &[String]) -> Result<ExitCode> {
     let root = checkout()?;
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)
-        .args(["run", "--quiet", "--package", "sereno-tests", "--example", "scenarios", "--"])
+        .args(["run", "--quiet"])
+        .args(profile)
+        .args(["--package", "sereno-tests", "--example", name, "--"])
         .args(order)
         .current_dir(&root)
         .status()
