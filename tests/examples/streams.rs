@@ -25,6 +25,9 @@ struct Arguments {
     /// What the plan does not show: none, light or full (with people).
     #[arg(long, default_value = "light")]
     clutter: String,
+    /// The last seconds before every contact, too.
+    #[arg(long)]
+    trace: bool,
     /// Flights at once; the number of cores without it.
     #[arg(long)]
     threads: Option<usize>,
@@ -63,6 +66,9 @@ fn fly(arguments: &Arguments) -> Result<bool> {
         }
         if let Some(touch) = &course.touch {
             println!("{}", line(touch));
+            if arguments.trace {
+                touch.trace.iter().for_each(|line| println!("    {line}"));
+            }
         }
         if so_far / 500 > told.swap(so_far / 500, Ordering::Relaxed) {
             println!("{so_far} of {} streams", settings.streams);
@@ -80,7 +86,9 @@ fn line(touch: &Touch) -> String {
     let [x, y, z] = touch.place_m;
     let kind = touch.kind.map_or_else(|| "between streams".to_owned(), |kind| format!("{kind:?}"));
     format!(
-        "CONTACT seed {} stream {}: after {:.1} s at {x:.2} {y:.2} {z:.2}, {:.2} m/s, {}; {kind}; broken: {}; place off by {:.2} m, said {:.2} m",
+        "CONTACT with {} at {:.0} deg, seed {} stream {}: after {:.1} s at {x:.2} {y:.2} {z:.2}, {:.2} m/s, {}; {kind}; broken: {}; place off by {:.2} m, said {:.2} m",
+        touch.what,
+        touch.bearing_deg,
         touch.seed,
         touch.stream.map_or_else(|| "-".to_owned(), |stream| stream.to_string()),
         touch.at_s,

@@ -6,7 +6,8 @@
 #![allow(clippy::print_stdout, reason = "printing is what it is for")]
 
 use anyhow::Result;
-use cli::flight::{Flight, Setup};
+use cli::flight::{Flight, Setup, vehicle_body};
+use cli::witness::touched;
 use ipc_types::{
     Channels, FlowMotion, Grid, MAX_SONARS, Phase, PilotState, Polar, Pose, Setpoint, SonarRanges,
     SteeringReason, Truth, Verb,
@@ -81,6 +82,7 @@ fn main() -> Result<()> {
 
 fn fly(setup: &Setup, seed: u64, keep: usize) -> Result<String> {
     let mut flight = Flight::start(setup, seed)?;
+    let body = vehicle_body(&setup.manifest, &setup.root, &setup.cache)?;
     let mut ports = flight.bus.tool("cli");
     let mut setpoints = ports.input::<Setpoint>()?;
     let mut poses = ports.input::<Pose>()?;
@@ -147,7 +149,7 @@ fn fly(setup: &Setup, seed: u64, keep: usize) -> Result<String> {
             let now = truth.z_m > ALOFT_M && truth.clearance_m < *near + if *within { AWAY_M } else { 0.0 };
             if now && !*within {
                 *count += 1;
-                let (name, _) = touched(&flight, &truth);
+                let (name, _) = touched(&flight.world, &truth, body);
                 let reason = SteeringReason::from_code(line.polar.reason);
                 let speed = line.setpoint.velocity_x_m_s.hypot(line.setpoint.velocity_y_m_s);
                 let route = line.polar.target_rad.is_finite();
@@ -202,7 +204,7 @@ fn fly(setup: &Setup, seed: u64, keep: usize) -> Result<String> {
     if truth.contacts == 0 {
         return Ok(out);
     }
-    let (name, bearing) = touched(&flight, &truth);
+    let (name, bearing) = touched(&flight.world, &truth, body);
     write!(
         out,
         "\n   touched {name} at {:.2} {:.2}, bearing {:.0} deg",
@@ -272,29 +274,4 @@ fn gaps(grid: &Grid, pose: &Pose) -> [f32; SIDES] {
         *gap = gap.min(dx.hypot(dy) - 0.225);
     }
     gaps
-}
-
-/// What was touched and in which direction of the plan frame it lies.
-fn touched(flight: &Flight, truth: &Truth) -> (String, f32) {
-    let people = truth.people.iter().take(truth.people_used as usize);
-    let person = people
-        .map(|person| (person.x_m - truth.x_m, person.y_m - truth.y_m))
-        .min_by(|a, b| a.0.hypot(a.1).total_cmp(&b.0.hypot(b.1)));
-    if let Some((dx, dy)) = person
-        && dx.hypot(dy) < 0.6
-    {
-        return ("a person".to_owned(), dy.atan2(dx));
-    }
-    let at = |x: f32, y: f32| flight.world.nearest(x, y, truth.z_m, 0.16, 0.225);
-    let here = at(truth.x_m, truth.y_m);
-    // It lies where the way out of it does not.
-    let (mut best, mut bearing) = (f32::NEG_INFINITY, 0.0);
-    for i in 0..72 {
-        let angle = (i as f32) * core::f32::consts::TAU / 72.0;
-        let there = at(truth.x_m - 0.1 * angle.cos(), truth.y_m - 0.1 * angle.sin());
-        if there.clearance > best {
-            (best, bearing) = (there.clearance, angle);
-        }
-    }
-    (here.name.to_owned(), bearing)
 }

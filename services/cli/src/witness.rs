@@ -17,6 +17,8 @@ const FRESH_NS: u64 = 250_000_000;
 /// A later start of the world's clock than this is a stall: steps are whole milliseconds, and what a stall skips is 200 ms
 /// or more.
 const STALL_S: f64 = 0.05;
+/// Whose middle is nearer than this to the airframe's edge is what was touched, metres: as broad as people are.
+const PERSON_M: f32 = 0.375;
 
 /// Everything that is seen of one flight.
 pub struct Witness {
@@ -264,6 +266,33 @@ impl Witness {
         };
         self.scorer.finish(world, ending)
     }
+}
+
+/// What is nearest to the airframe, in the words of the world, and in which direction of the plan frame it lies.
+#[must_use]
+pub fn touched(world: &World, truth: &Truth, body: Body) -> (String, f32) {
+    // People walk in the simulator's own world: the truth says where.
+    let people = truth.people.iter().take(truth.people_used as usize);
+    let person = people
+        .map(|person| (person.x_m - truth.x_m, person.y_m - truth.y_m))
+        .min_by(|a, b| a.0.hypot(a.1).total_cmp(&b.0.hypot(b.1)));
+    if let Some((dx, dy)) = person
+        && dx.hypot(dy) < body.radius_m + PERSON_M
+    {
+        return ("a person".to_owned(), dy.atan2(dx));
+    }
+    let at = |x: f32, y: f32| world.nearest(x, y, truth.z_m, body.height_m, body.radius_m);
+    let here = at(truth.x_m, truth.y_m);
+    // It lies where the way out of it does not.
+    let (mut best, mut bearing) = (f32::NEG_INFINITY, 0.0);
+    for turn in 0..72 {
+        let angle = turn as f32 * core::f32::consts::TAU / 72.0;
+        let there = at(truth.x_m - 0.1 * angle.cos(), truth.y_m - 0.1 * angle.sin());
+        if there.clearance > best {
+            (best, bearing) = (there.clearance, angle);
+        }
+    }
+    (here.name.to_owned(), bearing)
 }
 
 impl Round {

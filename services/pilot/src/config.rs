@@ -14,6 +14,9 @@ pub struct PilotConfig {
     pub height_m: f32,
     /// Greatest height that is ever flown, metres: under the lintels of doors with the mast.
     pub max_height_m: f32,
+    /// Least height that is asked for in flight, metres, or `height_m` where that is less: no sonar looks at what stands
+    /// under and beside the drone when it comes down among desks.
+    pub min_height_m: f32,
     /// Least distance kept to what is below in flight, metres.
     pub min_clearance_m: f32,
     /// Channels are not to be flown this long after they were made, seconds.
@@ -79,6 +82,7 @@ impl Default for PilotConfig {
         Self {
             height_m: 1.2,
             max_height_m: 1.6,
+            min_height_m: 0.9,
             min_clearance_m: 0.3,
             expiry_s: 0.12,
             take_off: TakeOffConfig::default(),
@@ -133,6 +137,7 @@ impl Validate for PilotConfig {
         let f = f64::from;
         within("max_height_m", f(self.max_height_m), 0.8..=2.5)?;
         within("height_m", f(self.height_m), 0.5..=f(self.max_height_m))?;
+        within("min_height_m", f(self.min_height_m), 0.3..=1.5)?;
         within("min_clearance_m", f(self.min_clearance_m), 0.1..=0.6)?;
         // flight's ladder calls channels stale after 100 ms at the earliest, at the latest it must see it.
         within("expiry_s", f(self.expiry_s), 0.06..=0.2)?;

@@ -4,7 +4,7 @@ use crate::core::{Decided, PilotCore};
 use crate::phases::BLIND_M_S;
 use crate::senses::age_s;
 use control::{
-    Action, Asking, Cause, Flown, Source, Tilt, Vector, VerticalWish, arbitrate, hold_velocity, stick,
+    Action, Asking, Cause, Flown, Source, Tilt, Vector, VerticalWish, Wish, arbitrate, hold_velocity, stick,
     wrap_angle, yaw_rate,
 };
 use core::f32::consts::TAU;
@@ -16,8 +16,6 @@ const NEAR_GROUND: [(f32, f32); 3] = [(0.06, 0.035), (0.15, 0.07), (0.35, 0.12)]
 const MOST_TRIM_RAD: f32 = 0.087;
 /// Time over which the trim that `flight` would hold level with is averaged, seconds.
 const TRIM_S: f32 = 6.0;
-/// Below this clearance the echoes of the side sonars may be the floor: nothing is pushed away from.
-const PUSH_CLEARANCE_M: f32 = 0.35;
 /// Below this clearance a landing learns no hover throttle: the ground carries, by air or by skids.
 const LEARN_CLEARANCE_M: f32 = 0.35;
 /// A velocity that is less certain is not flown by, m/s.
@@ -30,6 +28,8 @@ const FRESH_POSE_S: f32 = 0.15;
 const AIR_S: f32 = 1.0;
 /// No wish is flown faster than this many times the vehicle's cruise speed.
 const FASTEST: f32 = 1.2;
+/// Nearer than this to the place that it holds it was there a moment ago, metres.
+const BACK_M: f32 = 0.4;
 /// A velocity is reckoned on by tilt alone for so long, seconds.
 const RECKON_S: f32 = 1.5;
 /// To and fro by so much, radians, once in so many seconds: the sonars look 45 degrees apart, all around is heard in five
@@ -107,7 +107,7 @@ impl PilotCore {
     }
 
     /// The horizontal wish (plan frame), whose it is, and when it expires.
-    fn wish(&mut self, now: u64) -> (Vector, Source, u64) {
+    fn wish(&mut self, now: u64) -> (Wish, Source, u64) {
         let setpoint = self.fresh_setpoint(now).filter(|_| self.phase == Phase::Autonomous);
         let asking = Asking { airborne: true, navigation: setpoint.is_some(), failsafe: self.judged.action };
         let source = arbitrate(&asking);
@@ -124,7 +124,7 @@ impl PilotCore {
             match (setpoint.kind, setpoint.hold) {
                 (SetpointKind::Velocity, _) => {
                     self.hold = None;
-                    return (setpoint.velocity, source, expiry_ns);
+                    return (Wish::to(setpoint.velocity), source, expiry_ns);
                 }
                 (_, Some(hold)) => self.hold = Some(hold),
                 (_, None) => self.settle(),
@@ -141,8 +141,11 @@ impl PilotCore {
             self.looks_from = None;
         }
         let wish = match self.hold {
-            Some(hold) if place => hold_velocity(&self.config.hold, hold, self.motion.place()),
-            _ => Vector::ZERO,
+            Some(hold) if place => Wish {
+                velocity: hold_velocity(&self.config.hold, hold, self.motion.place()),
+                back: (hold - self.motion.place()).norm() < BACK_M,
+            },
+            _ => Wish::default(),
         };
         (wish, source, expiry_ns)
     }
@@ -167,11 +170,11 @@ impl PilotCore {
         let heading = self.heading();
         let guarded = self.shield.guard(
             now,
-            wish.limited(FASTEST * self.craft.cruise_m_s),
+            Wish { velocity: wish.velocity.limited(FASTEST * self.craft.cruise_m_s), ..wish },
             self.motion.velocity(),
             &self.footing(),
             self.walls.as_deref(),
-            clearance > PUSH_CLEARANCE_M,
+            clearance,
         );
         // Who is lost comes down level, but for the drift that the floor itself shows.
         let velocity_known = age_s(self.pose.at, now) < RECKON_S
@@ -271,8 +274,8 @@ impl PilotCore {
                     .below
                     .edge_m(now)
                     .map_or(self.height.surface_m(), |edge| edge.max(self.height.surface_m()));
-                let floor = below + c.min_clearance_m;
-                let wish = self.height_wish_m.max(floor).clamp(c.min_clearance_m, c.max_height_m);
+                let least = c.min_height_m.min(c.height_m);
+                let wish = self.height_wish_m.max(below + c.min_clearance_m).clamp(least, c.max_height_m);
                 let now_m = self.height.height_m();
                 let reach = HEIGHT_SLEW_M_S / c.climb.height_gain_per_s;
                 (VerticalWish::Height(wish.clamp(now_m - reach, now_m + reach)), true)

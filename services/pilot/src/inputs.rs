@@ -15,6 +15,9 @@ const SOUND_M_S: f32 = 343.0;
 /// drone so far between two poses.
 const JUMP_M: f32 = 0.5;
 
+/// Standard deviation of the place up to which a wall of the plan must be heard, metres.
+const SURE_M: f32 = 0.25;
+
 impl PilotCore {
     /// Takes an attitude.
     pub fn attitude(&mut self, message: &Attitude) {
@@ -53,6 +56,7 @@ impl PilotCore {
     fn follow_jump(&mut self, turned: f32) {
         self.hold = None;
         self.looks_from = None;
+        self.shield.forget();
         self.hold_heading = self.hold_heading.map(|heading| wrap_angle(heading + turned));
         let learned = self.velocity.learned();
         self.velocity.set_learned(learned.rotated(turned));
@@ -137,8 +141,11 @@ impl PilotCore {
                     place: self.place_at(reading.ping_ns),
                     echo,
                 };
-                if !self.shield.hear(usize::from(reading.sensor), look) {
+                let sensor = usize::from(reading.sensor);
+                if !self.shield.hear(sensor, look) {
                     self.refused += 1;
+                } else if let Some(walls) = self.walls.as_deref().filter(|_| self.pose.sigma_m < SURE_M) {
+                    self.shield.compare(sensor, walls);
                 }
             }
         }

@@ -7,11 +7,12 @@ use crate::checkout;
 use anyhow::{Context, Result};
 use cli::flight::{Setup, vehicle_body, world};
 use cli::orders::Orders;
-use cli::witness::Witness;
-use ipc_types::Verb;
+use cli::witness::{Witness, touched};
+use ipc_types::{MAX_SONARS, Pose, Setpoint, SonarRanges, Truth, Verb};
 use manifest::Subscription;
-use runtime::{Cache, Lockstep};
+use runtime::{Cache, Input, Lockstep, Ports};
 use serde::Serialize;
+use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -64,6 +65,12 @@ pub struct Touch {
     pub sigma_m: f32,
     /// Phase of the pilot.
     pub phase: String,
+    /// What was touched, and in which direction of the body frame it was, degrees.
+    pub what: String,
+    /// See `what`.
+    pub bearing_deg: f32,
+    /// The last seconds before it, a line each tenth.
+    pub trace: Vec<String>,
 }
 
 /// What came of one flight.
@@ -187,6 +194,7 @@ fn fly(settings: &Settings, seed: u64, cache: &Cache) -> Result<Course> {
     let mut witness = Witness::open(&mut ports, &world, body)?;
     let mut orders = Orders::open(&mut ports)?;
 
+    let mut trace = Trace::open(&mut ports)?;
     let mut course = Course::default();
     let run_for = |bus: &mut Lockstep, seconds: f64| {
         bus.run_until(bus.now() + ipc_types::nanoseconds(seconds));
@@ -211,7 +219,10 @@ fn fly(settings: &Settings, seed: u64, cache: &Cache) -> Result<Course> {
             }
         }
         last = stream.map(|_| (f64::from(truth.x_m), f64::from(truth.y_m)));
+        trace.look(&truth, witness.last_pilot.map_or(f32::NAN, |pilot| pilot.shield_speed_m_s));
         if truth.contacts > 0 {
+            let (what, bearing) = touched(&world, &truth, body);
+            let bearing = control::wrap_angle(bearing - truth.yaw_rad);
             let began_s = stream.map_or(0.0, |s| FIRST_S + PERIOD_S * s as f64);
             let of = stream.and_then(|stream| streams.get(stream));
             course.touch = Some(Touch {
@@ -225,6 +236,9 @@ fn fly(settings: &Settings, seed: u64, cache: &Cache) -> Result<Course> {
                 off_m: of.map_or(0.0, |s| s.offset.x_m.hypot(s.offset.y_m)),
                 sigma_m: of.map_or(0.0, |s| s.offset.sigma_m),
                 phase: witness.phase().to_owned(),
+                what,
+                bearing_deg: bearing.to_degrees(),
+                trace: trace.lines.iter().cloned().collect(),
             });
         }
         let over = flown_s > FIRST_S + PERIOD_S * (STREAMS - 1) as f64 + STREAM_S;
@@ -235,4 +249,67 @@ fn fly(settings: &Settings, seed: u64, cache: &Cache) -> Result<Course> {
     }
     course.simulated_s = bus.now() as f64 * 1e-9;
     Ok(course)
+}
+
+/// The last looks before a contact.
+struct Trace {
+    pose: Input<Pose>,
+    setpoint: Input<Setpoint>,
+    ranges: Input<SonarRanges>,
+    last: (Pose, Setpoint),
+    heard_m: [f32; MAX_SONARS],
+    lines: VecDeque<String>,
+}
+
+/// Looks kept: three seconds.
+const KEPT: usize = 30;
+
+impl Trace {
+    fn open(ports: &mut Ports) -> Result<Self> {
+        Ok(Self {
+            pose: ports.input()?,
+            setpoint: ports.input()?,
+            ranges: ports.input()?,
+            last: (Pose::default(), Setpoint::default()),
+            heard_m: [f32::INFINITY; MAX_SONARS],
+            lines: VecDeque::with_capacity(KEPT),
+        })
+    }
+
+    fn look(&mut self, truth: &Truth, shield_m_s: f32) {
+        while let Some(group) = self.ranges.receive() {
+            for reading in group.filled() {
+                if let Some(heard) = self.heard_m.get_mut(usize::from(reading.sensor)) {
+                    *heard = reading.range().unwrap_or(f32::NAN);
+                }
+            }
+        }
+        let pose = self.pose.latest().map_or(self.last.0, |new| *new);
+        let setpoint = self.setpoint.latest().map_or(self.last.1, |new| *new);
+        self.last = (pose, setpoint);
+        let sonars = self.heard_m.iter().rposition(|heard| !heard.is_infinite()).map_or(0, |last| last + 1);
+        let body = |x: f32, y: f32| {
+            let v = control::Vector::new(x, y).rotated(-truth.yaw_rad);
+            format!("{:5.2} {:5.2}", v.x, v.y)
+        };
+        if self.lines.len() == KEPT {
+            self.lines.pop_front();
+        }
+        self.lines.push_back(format!(
+            "{:6.1} at {:6.2} {:6.2} {:4.2} yaw {:4.0} gap {:5.2} | body frame: wish {} true {} believed {} | shield {:5.2} tilt {:4.1} {:4.1} | heard {:.2?}",
+            truth.time_s,
+            truth.x_m,
+            truth.y_m,
+            truth.z_m,
+            truth.yaw_rad.to_degrees(),
+            truth.clearance_m,
+            body(setpoint.velocity_x_m_s, setpoint.velocity_y_m_s),
+            body(truth.velocity_x_m_s, truth.velocity_y_m_s),
+            body(pose.velocity_x_m_s, pose.velocity_y_m_s),
+            shield_m_s,
+            truth.roll_rad.to_degrees(),
+            truth.pitch_rad.to_degrees(),
+            &self.heard_m[..sonars],
+        ));
+    }
 }

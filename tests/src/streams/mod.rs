@@ -23,6 +23,7 @@ pub const STREAMS: usize = 10;
 pub const FIRST_S: f64 = 8.0;
 /// One stream, and the next begins so much later, seconds: two of them hovering and whole again.
 pub const STREAM_S: f64 = 10.0;
+/// See [`STREAM_S`].
 pub const PERIOD_S: f64 = 12.0;
 
 /// The stream that is flown so long after the take-off.

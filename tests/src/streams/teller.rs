@@ -1,7 +1,7 @@
 //! In localization's place: tells the truth, and is off by what is drawn.
 
 use super::{STREAMS, stream_at};
-use control::{Vector, wrap_angle};
+use control::{Tilt, Vector, wrap_angle};
 use ipc_types::{Attitude, LocalizationState, Pose, Truth};
 use rand::rngs::Xoshiro256PlusPlus;
 use rand::{RngExt, SeedableRng};
@@ -12,8 +12,16 @@ const PERIOD_NS: u64 = 50_000_000;
 /// Error of the velocity that a filter with a flow sensor has, m/s (FACTS 8: 0.065), and for how long it stays, seconds.
 const VELOCITY_M_S: f32 = 0.05;
 const STAYS_S: f32 = 1.0;
-/// Time over which the level error is learned, seconds.
+/// A place slips away so fast, m/s, and farther than this it jumps, metres.
+const SLIPS_M_S: f32 = 0.3;
+const JUMPS_M: f32 = 0.6;
+/// Between two streams.
+const SURE: Offset = Offset { x_m: 0.0, y_m: 0.0, heading_rad: 0.0, sigma_m: 0.04 };
+/// Time over which the level error is learned, seconds, and over which the moving air is.
 const LEVEL_S: f32 = 3.0;
+const AIR_S: f32 = 0.5;
+/// Air drag, 1/s, as localization and pilot have it.
+const DRAG_PER_S: f32 = 0.25;
 
 /// What it is off by in one stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Deserialize, serde::Serialize)]
@@ -60,6 +68,9 @@ pub struct Teller {
     tilt: (f32, f32),
     level: (f32, f32),
     slip: Vector,
+    air: Vector,
+    velocity: Option<(f64, Vector)>,
+    off: Offset,
     told_ns: Option<u64>,
 }
 
@@ -80,6 +91,9 @@ impl Service for Teller {
             tilt: (0.0, 0.0),
             level: (0.0, 0.0),
             slip: Vector::ZERO,
+            air: Vector::ZERO,
+            velocity: None,
+            off: SURE,
             told_ns: None,
         })
     }
@@ -89,7 +103,8 @@ impl Service for Teller {
             self.yaw_rad = Some(attitude.yaw_rad);
             self.tilt = (attitude.roll_rad, attitude.pitch_rad);
         }
-        if let Some(truth) = self.truth.latest() {
+        while let Some(truth) = self.truth.receive() {
+            self.feel(&truth);
             if truth.armed != 0 && truth.on_ground == 0 {
                 self.took_off_s.get_or_insert(truth.time_s);
             }
@@ -100,11 +115,27 @@ impl Service for Teller {
         let dt = self.told_ns.map_or(0.0, |told| now.saturating_sub(told) as f32 * 1e-9);
         self.told_ns = Some(now);
         self.learn(dt, &truth);
+        self.slip_off(dt, &truth);
         self.pose.publish(&self.told(&truth, yaw_rad));
     }
 }
 
 impl Teller {
+    /// What the tilt does not explain of the motion is the air's, as localization learns it.
+    fn feel(&mut self, truth: &Truth) {
+        let velocity = Vector::new(truth.velocity_x_m_s, truth.velocity_y_m_s);
+        if let Some((before_s, before)) = self.velocity {
+            let dt = (truth.time_s - before_s) as f32;
+            let tilt = Tilt { roll: truth.roll_rad, pitch: truth.pitch_rad };
+            if dt > 1e-3 && dt < 0.2 && truth.on_ground == 0 {
+                let felt = (velocity - before) * (1.0 / dt);
+                let unexplained = felt - tilt.acceleration(truth.yaw_rad) + velocity * DRAG_PER_S;
+                self.air = self.air + (unexplained - self.air) * (dt / AIR_S).min(1.0);
+            }
+        }
+        self.velocity = Some((truth.time_s, velocity));
+    }
+
     /// Level error and the error of the velocity move on.
     fn learn(&mut self, dt: f32, truth: &Truth) {
         let share = (dt / LEVEL_S).min(1.0);
@@ -117,10 +148,17 @@ impl Teller {
         self.slip = self.slip * keep + Vector::new(draw(), draw());
     }
 
-    fn told(&self, truth: &Truth, yaw_rad: f32) -> Pose {
+    /// A filter slips to a wrong place, unless it is altogether wrong: then it was there at once.
+    fn slip_off(&mut self, dt: f32, truth: &Truth) {
         let flown_s = self.took_off_s.map_or(-1.0, |off| truth.time_s - off);
-        let sure = Offset { sigma_m: 0.04, ..Offset::default() };
-        let offset = stream_at(flown_s).and_then(|stream| self.offsets.get(stream)).copied().unwrap_or(sure);
+        let goal = stream_at(flown_s).and_then(|stream| self.offsets.get(stream)).copied().unwrap_or(SURE);
+        let way = Vector::new(goal.x_m - self.off.x_m, goal.y_m - self.off.y_m);
+        let step = if way.norm() > JUMPS_M { way } else { way.limited(SLIPS_M_S * dt) };
+        self.off = Offset { x_m: self.off.x_m + step.x, y_m: self.off.y_m + step.y, ..goal };
+    }
+
+    fn told(&self, truth: &Truth, yaw_rad: f32) -> Pose {
+        let offset = self.off;
         let heading = wrap_angle(truth.yaw_rad + offset.heading_rad);
         let velocity = Vector::new(truth.velocity_x_m_s, truth.velocity_y_m_s) + self.slip;
         Pose {
@@ -134,8 +172,8 @@ impl Teller {
             variance_y_m2: offset.sigma_m * offset.sigma_m,
             heading_sigma_rad: 0.03,
             velocity_sigma_m_s: VELOCITY_M_S,
-            air_x_m_s2: f32::NAN,
-            air_y_m_s2: f32::NAN,
+            air_x_m_s2: self.air.x,
+            air_y_m_s2: self.air.y,
             heading_offset_rad: wrap_angle(heading - yaw_rad),
             level_roll_rad: self.level.0,
             level_pitch_rad: self.level.1,

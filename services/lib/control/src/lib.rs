@@ -8,7 +8,6 @@
 #![forbid(unsafe_code)]
 
 mod arbitration;
-mod braking;
 mod check;
 mod climb;
 mod doubts;
@@ -20,16 +19,13 @@ mod liftoff;
 mod motion;
 mod planar;
 mod position;
-mod remembered;
 mod shield;
-mod sight;
 pub mod stick;
 mod touchdown;
 mod velocity;
 mod way_home;
 
 pub use arbitration::{Asking, Source, arbitrate};
-pub use braking::Braking;
 pub use check::RangeError;
 pub use climb::{ClimbConfig, ClimbController, VerticalWish};
 pub use failsafe::{
@@ -43,7 +39,7 @@ pub use liftoff::{Liftoff, LiftoffConfig, SpoolUp};
 pub use motion::{Motion, MotionConfig};
 pub use planar::{Vector, wrap_angle};
 pub use position::{HoldConfig, hold_velocity};
-pub use shield::{Echo, Footing, Guarded, Look, MAX_SENSORS, Shield, ShieldConfig};
+pub use shield::{Braking, Echo, Footing, Guarded, Look, MAX_SENSORS, Shield, ShieldConfig, Wish};
 pub use touchdown::{TouchDown, TouchDownConfig};
 pub use velocity::{Flown, Tilt, VelocityConfig, VelocityController};
 pub use way_home::WayHome;

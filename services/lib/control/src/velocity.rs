@@ -233,7 +233,7 @@ impl VelocityController {
         self.asked[self.newest].0 = dt;
         let wanted = match flown.velocity.and_then(Vector::known) {
             Some(velocity) => {
-                self.follow(dt, wish.known().unwrap_or(Vector::ZERO));
+                self.follow(dt, wish.known().unwrap_or(Vector::ZERO), velocity);
                 let error = self.reference - self.foreseen(velocity, flown, heading);
                 let drag = self.reference * self.drag_per_s;
                 let against = self.compensation - self.air;
@@ -262,10 +262,12 @@ impl VelocityController {
         self.tilt
     }
 
-    /// Moves the reference towards the wish, smoothly.
-    fn follow(&mut self, dt: f32, wish: Vector) {
+    /// Moves the reference towards the wish, smoothly. What slows the drone down may do so at once, also where the wish
+    /// leads back from where it flies.
+    fn follow(&mut self, dt: f32, wish: Vector, flown: Vector) {
         let c = &self.config;
-        let most = if wish.norm() < self.reference.norm() { c.braking_m_s2 } else { c.acceleration_m_s2 };
+        let brakes = wish.norm() < self.reference.norm() || (wish - self.reference).dot(flown) < 0.0;
+        let most = if brakes { c.braking_m_s2 } else { c.acceleration_m_s2 };
         let change = ((wish - self.reference) * (1.0 / c.response_s)).limited(most);
         self.change += (change - self.change) * (dt / c.smoothing_s).min(1.0);
         self.reference += self.change * dt;

@@ -9,7 +9,7 @@ use core::f32::consts::TAU;
 
 /// How well a direction is watched.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Sight {
+pub(super) enum Sight {
     /// Within the cone of a sonar that answers.
     Cone,
     /// Between the cones of two neighbours that both answer, and near enough to one of them.
@@ -20,7 +20,7 @@ pub(crate) enum Sight {
 
 /// What `bearing` is for a ring of sonars: azimuth of each axis, and whether it answers. `cone` and `look` are the
 /// half-angles of a cone and of what a sonar with an answering neighbour on that side joins to it, radians.
-pub(crate) fn sight(
+pub(super) fn sight(
     ring: &(impl Iterator<Item = (f32, bool)> + Clone),
     bearing: f32,
     cone: f32,
@@ -69,17 +69,17 @@ const SECTOR_RAD: f32 = TAU / SECTORS as f32;
 
 /// When a cone last swept over each direction of the plan.
 #[derive(Clone, Debug)]
-pub(crate) struct Glances {
+pub(super) struct Glances {
     at_ns: [Option<u64>; SECTORS],
 }
 
 impl Glances {
-    pub(crate) fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self { at_ns: [None; SECTORS] }
     }
 
     /// A cone of this half-angle looked along `axis`: sectors count that lie in it wholly.
-    pub(crate) fn look(&mut self, at_ns: u64, axis: f32, cone: f32) {
+    pub(super) fn look(&mut self, at_ns: u64, axis: f32, cone: f32) {
         for (sector, at) in self.at_ns.iter_mut().enumerate() {
             let middle = (sector as f32 + 0.5) * SECTOR_RAD;
             if wrap_angle(middle - axis).abs() <= cone - 0.5 * SECTOR_RAD {
@@ -89,7 +89,7 @@ impl Glances {
     }
 
     /// For how long nobody has looked in a direction of the plan, seconds.
-    pub(crate) fn age_s(&self, now: u64, direction: f32) -> f32 {
+    pub(super) fn age_s(&self, now: u64, direction: f32) -> f32 {
         let sector = (direction.rem_euclid(TAU) / SECTOR_RAD) as usize;
         self.at_ns.get(sector).copied().flatten().map_or(f32::INFINITY, |at| seconds(at, now))
     }

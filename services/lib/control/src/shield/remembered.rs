@@ -30,19 +30,19 @@ struct Point {
 
 /// Echoes of the last seconds in the plan frame.
 #[derive(Clone, Debug)]
-pub(crate) struct Remembered {
+pub(super) struct Remembered {
     points: [Option<Point>; POINTS],
     next: usize,
 }
 
 impl Remembered {
-    pub(crate) fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self { points: [None; POINTS], next: 0 }
     }
 
     /// Takes an echo of a sonar with its face at `face` (plan frame) that looks along `axis`, from a drone
     /// whose middle is at `middle`.
-    pub(crate) fn hear(&mut self, now: u64, middle: Vector, face: Vector, axis: f32, range_m: f32) {
+    pub(super) fn hear(&mut self, now: u64, middle: Vector, face: Vector, axis: f32, range_m: f32) {
         for slot in &mut self.points {
             if let Some(point) = slot {
                 let ray = point.at - face;
@@ -67,7 +67,7 @@ impl Remembered {
     }
 
     /// Things heard often enough and not too long ago, plan frame.
-    pub(crate) fn things(&self, now: u64) -> impl Iterator<Item = Vector> + '_ {
+    pub(super) fn things(&self, now: u64) -> impl Iterator<Item = Vector> + '_ {
         self.points
             .iter()
             .flatten()

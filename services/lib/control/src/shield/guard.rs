@@ -1,0 +1,178 @@
+//! What is left of a wish.
+
+use super::heard::Hit;
+use super::sight::Sight;
+use super::{Braking, Footing, Guarded, Shield, Wish};
+use crate::planar::{Vector, wrap_angle};
+use floorplan::DistanceField;
+
+/// Cosine of the angle from which something begins to be straight ahead (40 degrees; all of it at 28).
+const AHEAD_FROM: f32 = 0.766;
+/// A wish is turned into the nearest watched direction when that is nearer than this, radians.
+const BEND_RAD: f32 = 0.87;
+/// Fastest way back to where no sonar looks, m/s: it came from there a moment ago.
+const BLIND_M_S: f32 = 0.1;
+/// The sonars hang under the body and look down by so much more than their cones when it tilts, radians (10 degrees).
+const TILTED_RAD: f32 = 0.17;
+/// Of the way to the floor along the cone's lower edge: mounts and clearance err.
+const FLOOR_SHARE: f32 = 0.8;
+/// Standard deviation of the place beyond which no wall of the plan is moved away from, metres.
+const PUSHED_M: f32 = 0.2;
+/// Echoes are not believed to come nearer by more than the velocity and this, m/s: errors of the velocity, and people.
+const UNEXPECTED_M_S: f32 = 0.3;
+
+impl Shield {
+    /// Passes a wish (plan frame, m/s): what is left can be stopped before anything that is seen. `flown` is
+    /// the velocity now: what is too fast towards a near thing is braked harder than by a smaller wish alone.
+    /// Below a small `clearance_m` over what is underneath, echoes may be the floor's.
+    pub fn guard(
+        &self,
+        now: u64,
+        wish: Wish,
+        flown: Vector,
+        footing: &Footing,
+        walls: Option<&DistanceField>,
+        clearance_m: f32,
+    ) -> Guarded {
+        let blind = if wish.back { BLIND_M_S } else { 0.0 };
+        let wish = wish.velocity.known().unwrap_or(Vector::ZERO);
+        let flown = flown.known().unwrap_or(Vector::ZERO);
+        let braking = self.braking();
+        let mut velocity = self.slide(now, wish, flown, footing, &braking);
+        let speed = velocity.norm();
+        if speed > 1e-4 {
+            let bearing = wrap_angle(velocity.angle() - footing.heading);
+            velocity = match self.sight(now, bearing) {
+                Sight::Cone | Sight::Gap => velocity,
+                Sight::Closed(Some((edge, off))) if off < BEND_RAD => {
+                    Vector::along(edge + footing.heading) * (speed * off.cos())
+                }
+                _ => velocity.limited(blind),
+            };
+        }
+        let speed = velocity.norm();
+        if speed > 1e-4 {
+            let allowed = self.allowed(now, velocity * (1.0 / speed), flown, footing, walls);
+            velocity = velocity.limited(allowed.max(blind));
+        }
+        velocity += self.retreat(now, flown, footing, walls, clearance_m);
+        let wished = wish.norm();
+        let allowed_m_s =
+            if wished > 1e-3 { self.allowed(now, wish * (1.0 / wished), flown, footing, walls) } else { 0.0 };
+        Guarded {
+            velocity: velocity.known().unwrap_or(Vector::ZERO),
+            allowed_m_s,
+            limited: (velocity - wish).norm() > 0.02,
+        }
+    }
+
+    /// What points at a near thing is taken out of the wish, so that the rest may slide along it.
+    fn slide(&self, now: u64, wish: Vector, flown: Vector, footing: &Footing, braking: &Braking) -> Vector {
+        let mut velocity = wish;
+        for _ in 0..2 {
+            let heard = self.hits(now, flown).map(|hit| hit.centre);
+            for centre in heard.chain(self.things(now, footing.place)) {
+                let distance = centre.norm();
+                let towards = if distance > 1e-3 { centre * (1.0 / distance) } else { continue };
+                let ahead = (wish.dot(towards) / wish.norm().max(1e-3) - AHEAD_FROM) / (1.0 - AHEAD_FROM);
+                let room = self.config.margin_m + self.config.standoff_m * (2.0 * ahead).clamp(0.0, 1.0);
+                let most = braking.speed(distance - self.radius_m - room);
+                let excess = velocity.dot(towards) - most;
+                if excess > 0.0 {
+                    velocity = velocity - towards * excess;
+                }
+            }
+        }
+        velocity
+    }
+
+    /// Back from what is too near or comes too fast. What was heard a moment ago and what the plan says do not hold it back:
+    /// they may be wrong, and this is the way that the drone came. Into a hole of the sonars' ring it goes slowly.
+    fn retreat(
+        &self,
+        now: u64,
+        flown: Vector,
+        footing: &Footing,
+        walls: Option<&DistanceField>,
+        clearance_m: f32,
+    ) -> Vector {
+        let c = &self.config;
+        let floor_m = self.floor_m(clearance_m);
+        let mut brake = self.brake(now, flown, floor_m);
+        let fast = flown.norm();
+        if fast > c.creep_m_s {
+            let along = flown * (1.0 / fast);
+            let most = self.braking().speed(self.sure_way(along, footing, walls)).max(c.creep_m_s);
+            brake += along * (fast - most - brake.dot(along)).max(0.0);
+        }
+        let brake = brake.limited(c.max_brake_m_s);
+        let push = self.push(now, flown, floor_m) + self.plan_push(footing, walls);
+        let retreat = push.limited(c.max_push_m_s) - brake;
+        let speed = retreat.norm();
+        if speed < 1e-4 {
+            return Vector::ZERO;
+        }
+        let direction = retreat * (1.0 / speed);
+        let open = match self.sight(now, wrap_angle(direction.angle() - footing.heading)) {
+            Sight::Closed(_) => BLIND_M_S,
+            Sight::Cone | Sight::Gap => f32::INFINITY,
+        };
+        let way = self.heard_way(now, direction, flown, self.radius_m + 0.5 * c.margin_m);
+        retreat.limited(self.braking().speed(way).min(open))
+    }
+
+    /// Echoes from nearer than this are not the floor's, metres: the cone's lower edge meets it farther away.
+    fn floor_m(&self, clearance_m: f32) -> f32 {
+        let down = self.config.cone_half_angle_deg.to_radians() + TILTED_RAD;
+        if clearance_m.is_finite() { FLOOR_SHARE * clearance_m.max(0.0) / down.sin() } else { f32::INFINITY }
+    }
+
+    /// What is flown, or by the echoes comes nearer, faster than it can be stopped: the most of it in every direction.
+    fn brake(&self, now: u64, flown: Vector, floor_m: f32) -> Vector {
+        let braking = self.braking();
+        let mut brake = Vector::ZERO;
+        for hit in self.hits(now, flown) {
+            let Some((towards, gap)) = self.side(&hit).filter(|_| hit.range < floor_m) else { continue };
+            let believed = flown.dot(towards);
+            let closing = hit.closing.map_or(believed, |closing| closing.clamp(believed, believed + UNEXPECTED_M_S));
+            let excess = closing - braking.speed(gap - self.config.margin_m) - brake.dot(towards);
+            if closing > 0.0 && excess > 0.0 {
+                brake += towards * excess;
+            }
+        }
+        brake
+    }
+
+    /// Away from what is near: both jambs of a door push alike, which centres.
+    fn push(&self, now: u64, flown: Vector, floor_m: f32) -> Vector {
+        let mut push = Vector::ZERO;
+        for hit in self.hits(now, flown) {
+            let Some((towards, gap)) = self.side(&hit).filter(|_| hit.range < floor_m) else { continue };
+            let missing = self.config.near_m - gap;
+            if missing > 0.0 {
+                push = push - towards * (self.config.push_gain_per_s * missing);
+            }
+        }
+        push
+    }
+
+    /// Away from the nearest wall of the plan, while the pose is sure of it.
+    fn plan_push(&self, footing: &Footing, walls: Option<&DistanceField>) -> Vector {
+        let c = &self.config;
+        let (Some(walls), Some(place)) = (walls, footing.place) else { return Vector::ZERO };
+        let missing = c.plan_near_m - (walls.distance(place.x, place.y) - self.radius_m - c.plan_margin_m);
+        let (x, y) = walls.gradient(place.x, place.y);
+        let away = Vector::new(x, y);
+        let steep = away.norm();
+        if missing <= 0.0 || footing.sigma_m > PUSHED_M || steep < 0.3 {
+            return Vector::ZERO;
+        }
+        away * (c.push_gain_per_s * missing / steep.max(1.0))
+    }
+
+    /// Direction of an echo and the gap between it and the disc.
+    fn side(&self, hit: &Hit) -> Option<(Vector, f32)> {
+        let distance = hit.centre.norm();
+        (distance > 1e-3).then(|| (hit.centre * (1.0 / distance), distance - self.radius_m))
+    }
+}

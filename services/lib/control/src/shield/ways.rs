@@ -1,0 +1,121 @@
+//! How far the way is free in a direction, and how fast it may be flown.
+
+use super::sight::{Sight, sight};
+use super::{Footing, Shield};
+use crate::planar::{Vector, wrap_angle};
+use floorplan::DistanceField;
+
+/// Free way beyond which nothing matters at indoor speeds, metres.
+const FAR_M: f32 = 4.0;
+/// Directions within a cone that an echo is tried at.
+const ARC: [f32; 7] = [-1.0, -0.667, -0.333, 0.0, 0.333, 0.667, 1.0];
+/// Up to this standard deviation the place is sure of where the disc is, metres: twice what a flight with a flow sensor
+/// says of itself.
+const SURE_M: f32 = 0.08;
+
+impl Shield {
+    /// Free way of the disc with its margin in a direction (unit vector, plan frame) by the echoes alone,
+    /// metres: a fresh echo may come from anywhere on the arc across its cone, and the worst place counts; one
+    /// that is remembered from `place` counts for the middle of its arc.
+    #[must_use]
+    pub fn free_way(&self, now: u64, direction: Vector, flown: Vector, place: Option<Vector>) -> f32 {
+        let wide = self.radius_m + self.config.margin_m;
+        let mut free = self.heard_way(now, direction, flown, wide);
+        for thing in self.things(now, place) {
+            free = free.min(way_to(thing, direction, wide));
+        }
+        free
+    }
+
+    /// The same of a disc of radius `wide` by the fresh echoes alone.
+    pub(super) fn heard_way(&self, now: u64, direction: Vector, flown: Vector, wide: f32) -> f32 {
+        let half = self.config.cone_half_angle_deg.to_radians();
+        let mut free = FAR_M;
+        for hit in self.hits(now, flown) {
+            for part in ARC {
+                let point = hit.face + Vector::along(hit.axis + part * half) * hit.range;
+                free = free.min(way_to(point, direction, wide));
+            }
+        }
+        free
+    }
+
+    /// What was heard a moment ago, from the middle of the drone.
+    pub(super) fn things(&self, now: u64, place: Option<Vector>) -> impl Iterator<Item = Vector> + '_ {
+        place.into_iter().flat_map(move |place| self.remembered.things(now).map(move |thing| thing - place))
+    }
+
+    /// Free way of a disc of `radius` by the plan's walls. Inside the radius sliding along and away is free.
+    fn plan_way(walls: &DistanceField, from: Vector, direction: Vector, radius: f32) -> f32 {
+        let mut way = 0.0;
+        let mut before = walls.distance(from.x, from.y);
+        let mut within = before < radius;
+        while way < FAR_M {
+            let step = (before - radius).max(0.03);
+            let at = from + direction * (way + step);
+            let distance = walls.distance(at.x, at.y);
+            within = within && distance < radius;
+            if distance < radius && (!within || distance < before - 0.2 * step) {
+                return way;
+            }
+            before = distance;
+            way += step;
+        }
+        FAR_M
+    }
+
+    /// The same as far as the place is sure, with the room that the plan and the place may err by.
+    pub(super) fn sure_way(&self, direction: Vector, footing: &Footing, walls: Option<&DistanceField>) -> f32 {
+        match (walls, footing.place) {
+            (Some(walls), Some(place)) if footing.sigma_m < SURE_M => {
+                Self::plan_way(walls, place, direction, self.radius_m + self.config.plan_margin_m + footing.sigma_m)
+            }
+            _ => FAR_M,
+        }
+    }
+
+    /// How well a direction (body frame) is watched now.
+    pub(super) fn sight(&self, now: u64, bearing: f32) -> Sight {
+        let ring = self.sensors.iter().flatten().map(|s| (s.bearing, self.fresh(s, now).is_some() && !s.doubted()));
+        let (cone, look) = (self.config.cone_half_angle_deg, self.config.look_half_angle_deg);
+        sight(&ring, bearing, cone.to_radians(), look.to_radians())
+    }
+
+    /// The speed that may be flown in a direction (unit vector, plan frame).
+    pub(super) fn allowed(
+        &self,
+        now: u64,
+        direction: Vector,
+        flown: Vector,
+        footing: &Footing,
+        walls: Option<&DistanceField>,
+    ) -> f32 {
+        let c = &self.config;
+        let seen = self.sight(now, wrap_angle(direction.angle() - footing.heading));
+        let most = match seen {
+            Sight::Closed(_) => return 0.0,
+            Sight::Gap if self.glances.age_s(now, direction.angle()) > c.glance_s => c.gap_m_s,
+            Sight::Gap | Sight::Cone => f32::INFINITY,
+        };
+        let braking = self.braking();
+        let speed = braking.speed(self.free_way(now, direction, flown, footing.place)).min(most);
+        let (Some(walls), Some(place)) = (walls, footing.place) else { return speed };
+        let sigma = if footing.sigma_m.is_finite() { footing.sigma_m.clamp(0.0, 0.08) } else { 0.08 };
+        let soft = Self::plan_way(walls, place, direction, self.radius_m + c.plan_margin_m + sigma);
+        let overlap = (sigma - SURE_M).clamp(-c.plan_margin_m, c.plan_overlap_m);
+        let hard = Self::plan_way(walls, place, direction, (self.radius_m - overlap).max(0.05));
+        // Where no cone looks, nobody says that the plan is wrong.
+        let creep = if seen == Sight::Cone { c.creep_m_s.min(braking.speed(hard)) } else { 0.0 };
+        speed.min(braking.speed(soft).max(creep))
+    }
+}
+
+/// Way of a disc of radius `wide` in a direction until its edge is at a point, metres; infinite past it.
+fn way_to(point: Vector, direction: Vector, wide: f32) -> f32 {
+    let (ahead, aside) = (point.dot(direction), point.cross(direction).abs());
+    if ahead > 0.0 && aside < wide {
+        (ahead - (wide * wide - aside * aside).sqrt()).max(0.0)
+    } else {
+        f32::INFINITY
+    }
+}
