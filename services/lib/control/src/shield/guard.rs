@@ -45,7 +45,7 @@ impl Shield {
             velocity = match self.sight(now, bearing) {
                 Sight::Cone | Sight::Gap => velocity,
                 Sight::Closed(Some((edge, off))) if off < BEND_RAD => {
-                    Vector::along(edge + footing.heading) * (speed * off.cos())
+                    Vector::along(edge + footing.heading) * (speed * off.cos()).min(self.config.gap_m_s)
                 }
                 _ => velocity.limited(blind),
             };
@@ -53,7 +53,7 @@ impl Shield {
         let speed = velocity.norm();
         if speed > 1e-4 {
             let allowed = self.allowed(now, velocity * (1.0 / speed), flown, footing, walls);
-            velocity = velocity.limited(allowed.max(blind));
+            velocity = velocity.limited(allowed.min(self.beside(now, flown, footing)).max(blind));
         }
         velocity += self.retreat(now, flown, footing, walls, clearance_m);
         let wished = wish.norm();
@@ -64,6 +64,13 @@ impl Shield {
             allowed_m_s,
             limited: (velocity - wish).norm() > 0.02,
         }
+    }
+
+    /// Most speed beside what is near: there is no time to find out where exactly a wall is that is slid along.
+    fn beside(&self, now: u64, flown: Vector, footing: &Footing) -> f32 {
+        let heard = self.hits(now, flown).map(|hit| hit.centre.norm());
+        let nearest = heard.chain(self.things(now, footing.place).map(Vector::norm)).fold(f32::INFINITY, f32::min);
+        self.config.beside_m_s + self.config.beside_gain_per_s * (nearest - self.radius_m).max(0.0)
     }
 
     /// What points at a near thing is taken out of the wish, so that the rest may slide along it.

@@ -24,11 +24,15 @@ pub(super) struct Sensor {
     before: [Option<(u64, f32)>; 2],
     /// Pings that did not hear a wall which it looked squarely at, less those that did.
     missed: u8,
+    /// The range that it has said again and again, and where the drone was when it began to.
+    still: Option<(f32, Vector)>,
+    /// It has said the same while the drone flew towards or away from what it hears.
+    stuck: bool,
 }
 
 impl Sensor {
     pub(super) fn new(bearing: f32, mount: Vector) -> Self {
-        Self { bearing, mount, look: None, before: [None; 2], missed: 0 }
+        Self { bearing, mount, look: None, before: [None; 2], missed: 0, still: None, stuck: false }
     }
 
     fn take(&mut self, look: Look) {
@@ -37,12 +41,28 @@ impl Sensor {
             Echo::Nothing => None,
         });
         self.before = [last, self.before[0].filter(|_| last.is_some())];
+        self.watch(&look);
         self.look = Some(look);
+    }
+
+    /// A range that stays the same while the drone comes nearer to what it is heard from, or leaves it, is no range.
+    fn watch(&mut self, look: &Look) {
+        let (Echo::Range(range), Some(place)) = (look.echo, look.place) else {
+            (self.still, self.stuck) = (None, self.stuck && look.place.is_none());
+            return;
+        };
+        match self.still {
+            Some((same, from)) if (range - same).abs() < SAME_M => {
+                let along = (place - from).dot(Vector::along(self.bearing + look.heading));
+                self.stuck |= along.abs() > MOVED_M;
+            }
+            _ => (self.still, self.stuck) = (Some((range, place)), false),
+        }
     }
 
     /// Whether it is believed to be deaf, or to say always the same, or to look elsewhere than its mount says.
     pub(super) fn doubted(&self) -> bool {
-        self.missed >= DOUBTED
+        self.stuck || self.missed >= DOUBTED
     }
 
     /// How fast what it hears comes nearer, m/s, by the slower of the last two steps; `None` unless three pings in a row
@@ -63,6 +83,10 @@ impl Sensor {
     }
 }
 
+/// Ranges that differ by less are the same, metres: one quantum (FACTS 2).
+const SAME_M: f32 = 0.003_1;
+/// Having flown so far along its axis, a sonar must say something else, metres: twice what the place errs by meanwhile.
+const MOVED_M: f32 = 0.08;
 /// Walls of the plan are expected to answer from nearer than this, metres: from twice as far they do, and half as near it is
 /// too late.
 const EXPECTED_M: f32 = 1.4;

@@ -41,6 +41,10 @@ pub struct ShieldConfig {
     /// Most that is taken off the wish beyond zero to brake what comes too fast, m/s: the velocity loop brakes by what the
     /// velocity misses the wish by, and a wish of zero alone brakes 0.5 m/s with less than half of what the law counts on.
     pub max_brake_m_s: f32,
+    /// Speed that may be flown with something at the disc's edge, m/s...
+    pub beside_m_s: f32,
+    /// ... and more for each metre of the gap to it, 1/s: 0.4 m/s in the middle of a door of 0.9 m.
+    pub beside_gain_per_s: f32,
     /// Half-angle to which a sonar and an answering neighbour join, degrees: 27.5 joins the flown layout at its widest.
     /// Beyond the cone that is a gap; beside a sonar that does not answer the cone is all.
     pub look_half_angle_deg: f32,
@@ -73,10 +77,12 @@ impl Default for ShieldConfig {
         Self {
             margin_m: 0.07,
             standoff_m: 0.12,
-            near_m: 0.15,
+            near_m: 0.2,
             push_gain_per_s: 2.0,
             max_push_m_s: 0.3,
             max_brake_m_s: 0.4,
+            beside_m_s: 0.1,
+            beside_gain_per_s: 1.5,
             look_half_angle_deg: 28.0,
             gap_m_s: 0.25,
             glance_s: 1.6,
@@ -102,6 +108,8 @@ impl ShieldConfig {
         within("shield.push_gain_per_s", self.push_gain_per_s, 0.0, 4.0)?;
         within("shield.max_push_m_s", self.max_push_m_s, 0.0, 0.5)?;
         within("shield.max_brake_m_s", self.max_brake_m_s, 0.0, 0.6)?;
+        within("shield.beside_m_s", self.beside_m_s, 0.05, 1.0)?;
+        within("shield.beside_gain_per_s", self.beside_gain_per_s, 0.0, 10.0)?;
         within("shield.look_half_angle_deg", self.look_half_angle_deg, 15.0, 45.0)?;
         within("shield.gap_m_s", self.gap_m_s, 0.0, 0.5)?;
         within("shield.glance_s", self.glance_s, 0.0, 4.0)?;
