@@ -258,6 +258,8 @@ impl PilotCore {
             place: known.then(|| self.motion.place()),
             sigma_m: self.pose.sigma_m,
             heading: self.heading(),
+            velocity: self.motion.velocity(),
+            clearance_m: self.height.clearance_m(),
         }
     }
 

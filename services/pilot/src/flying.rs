@@ -168,14 +168,8 @@ impl PilotCore {
         let (wish, source, expiry_ns) = self.wish(now);
         let clearance = self.height.clearance_m();
         let heading = self.heading();
-        let guarded = self.shield.guard(
-            now,
-            Wish { velocity: wish.velocity.limited(FASTEST * self.craft.cruise_m_s), ..wish },
-            self.motion.velocity(),
-            &self.footing(),
-            self.walls.as_deref(),
-            clearance,
-        );
+        let wish = Wish { velocity: wish.velocity.limited(FASTEST * self.craft.cruise_m_s), ..wish };
+        let guarded = self.shield.guard(now, wish, &self.footing(), self.walls.as_deref());
         // Who is lost comes down level, but for the drift that the floor itself shows.
         let velocity_known = age_s(self.pose.at, now) < RECKON_S
             && self.pose.velocity_sigma < MOST_VELOCITY_SIGMA

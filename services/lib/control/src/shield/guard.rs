@@ -22,23 +22,21 @@ const PUSHED_M: f32 = 0.2;
 const UNEXPECTED_M_S: f32 = 0.3;
 
 impl Shield {
-    /// Passes a wish (plan frame, m/s): what is left can be stopped before anything that is seen. `flown` is
-    /// the velocity now: what is too fast towards a near thing is braked harder than by a smaller wish alone.
-    /// Below a small `clearance_m` over what is underneath, echoes may be the floor's.
+    /// Passes a wish (plan frame, m/s): what is left can be stopped before anything that is seen. What flies too fast
+    /// towards a near thing is braked harder than by a smaller wish alone, and what is too near is moved away from.
     pub fn guard(
         &self,
         now: u64,
         wish: Wish,
-        flown: Vector,
         footing: &Footing,
         walls: Option<&DistanceField>,
-        clearance_m: f32,
     ) -> Guarded {
         let blind = if wish.back { BLIND_M_S } else { 0.0 };
         let wish = wish.velocity.known().unwrap_or(Vector::ZERO);
-        let flown = flown.known().unwrap_or(Vector::ZERO);
+        let footing =
+            &Footing { velocity: footing.velocity.known().unwrap_or(Vector::ZERO), ..*footing };
         let braking = self.braking();
-        let mut velocity = self.slide(now, wish, flown, footing, &braking);
+        let mut velocity = self.slide(now, wish, footing, &braking);
         let speed = velocity.norm();
         if speed > 1e-4 {
             let bearing = wrap_angle(velocity.angle() - footing.heading);
@@ -52,13 +50,16 @@ impl Shield {
         }
         let speed = velocity.norm();
         if speed > 1e-4 {
-            let allowed = self.allowed(now, velocity * (1.0 / speed), flown, footing, walls);
-            velocity = velocity.limited(allowed.min(self.beside(now, flown, footing)).max(blind));
+            let allowed = self.allowed(now, velocity * (1.0 / speed), footing, walls);
+            velocity = velocity.limited(allowed.min(self.beside(now, footing)).max(blind));
         }
-        velocity += self.retreat(now, flown, footing, walls, clearance_m);
+        let retreat = self.retreat(now, footing, walls);
+        if retreat != Vector::ZERO {
+            velocity = self.seen(now, velocity + retreat, footing);
+        }
         let wished = wish.norm();
         let allowed_m_s =
-            if wished > 1e-3 { self.allowed(now, wish * (1.0 / wished), flown, footing, walls) } else { 0.0 };
+            if wished > 1e-3 { self.allowed(now, wish * (1.0 / wished), footing, walls) } else { 0.0 };
         Guarded {
             velocity: velocity.known().unwrap_or(Vector::ZERO),
             allowed_m_s,
@@ -67,17 +68,17 @@ impl Shield {
     }
 
     /// Most speed beside what is near: there is no time to find out where exactly a wall is that is slid along.
-    fn beside(&self, now: u64, flown: Vector, footing: &Footing) -> f32 {
-        let heard = self.hits(now, flown).map(|hit| hit.centre.norm());
+    fn beside(&self, now: u64, footing: &Footing) -> f32 {
+        let heard = self.hits(now, footing.velocity).map(|hit| hit.centre.norm());
         let nearest = heard.chain(self.things(now, footing.place).map(Vector::norm)).fold(f32::INFINITY, f32::min);
         self.config.beside_m_s + self.config.beside_gain_per_s * (nearest - self.radius_m).max(0.0)
     }
 
     /// What points at a near thing is taken out of the wish, so that the rest may slide along it.
-    fn slide(&self, now: u64, wish: Vector, flown: Vector, footing: &Footing, braking: &Braking) -> Vector {
+    fn slide(&self, now: u64, wish: Vector, footing: &Footing, braking: &Braking) -> Vector {
         let mut velocity = wish;
         for _ in 0..2 {
-            let heard = self.hits(now, flown).map(|hit| hit.centre);
+            let heard = self.hits(now, footing.velocity).map(|hit| hit.centre);
             for centre in heard.chain(self.things(now, footing.place)) {
                 let distance = centre.norm();
                 let towards = if distance > 1e-3 { centre * (1.0 / distance) } else { continue };
@@ -94,17 +95,16 @@ impl Shield {
     }
 
     /// Back from what is too near or comes too fast. What was heard a moment ago and what the plan says do not hold it back:
-    /// they may be wrong, and this is the way that the drone came. Into a hole of the sonars' ring it goes slowly.
+    /// they may be wrong, and this is the way that the drone came.
     fn retreat(
         &self,
         now: u64,
-        flown: Vector,
         footing: &Footing,
         walls: Option<&DistanceField>,
-        clearance_m: f32,
     ) -> Vector {
         let c = &self.config;
-        let floor_m = self.floor_m(clearance_m);
+        let flown = footing.velocity;
+        let floor_m = self.floor_m(footing.clearance_m);
         let mut brake = self.brake(now, flown, floor_m);
         let fast = flown.norm();
         if fast > c.creep_m_s {
@@ -114,18 +114,23 @@ impl Shield {
         }
         let brake = brake.limited(c.max_brake_m_s);
         let push = self.push(now, flown, floor_m) + self.plan_push(footing, walls);
-        let retreat = push.limited(c.max_push_m_s) - brake;
-        let speed = retreat.norm();
+        push.limited(c.max_push_m_s) - brake
+    }
+
+    /// What of a velocity stops before every fresh echo, slowly where no sonar looks.
+    fn seen(&self, now: u64, velocity: Vector, footing: &Footing) -> Vector {
+        let speed = velocity.norm();
         if speed < 1e-4 {
             return Vector::ZERO;
         }
-        let direction = retreat * (1.0 / speed);
+        let direction = velocity * (1.0 / speed);
         let open = match self.sight(now, wrap_angle(direction.angle() - footing.heading)) {
             Sight::Closed(_) => BLIND_M_S,
             Sight::Cone | Sight::Gap => f32::INFINITY,
         };
-        let way = self.heard_way(now, direction, flown, self.radius_m + 0.5 * c.margin_m);
-        retreat.limited(self.braking().speed(way).min(open))
+        let wide = self.radius_m + 0.5 * self.config.margin_m;
+        let way = self.heard_way(now, direction, footing.velocity, wide);
+        velocity.limited(self.braking().speed(way).min(open))
     }
 
     /// Echoes from nearer than this are not the floor's, metres: the cone's lower edge meets it farther away.

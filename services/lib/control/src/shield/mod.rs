@@ -146,7 +146,7 @@ pub struct Look {
     pub echo: Echo,
 }
 
-/// Where the drone stands on the plan.
+/// Where the drone is and how it flies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footing {
     /// Plan frame; `None` when it is not known.
@@ -155,6 +155,10 @@ pub struct Footing {
     pub sigma_m: f32,
     /// Plan frame.
     pub heading: f32,
+    /// Plan frame, m/s; zero when it is not known.
+    pub velocity: Vector,
+    /// Over what is underneath, metres: near it the echoes of the side sonars may be its.
+    pub clearance_m: f32,
 }
 
 /// What is wished.

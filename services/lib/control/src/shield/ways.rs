@@ -18,17 +18,18 @@ impl Shield {
     /// metres: a fresh echo may come from anywhere on the arc across its cone, and the worst place counts; one
     /// that is remembered from `place` counts for the middle of its arc.
     #[must_use]
-    pub fn free_way(&self, now: u64, direction: Vector, flown: Vector, place: Option<Vector>) -> f32 {
+    pub fn free_way(&self, now: u64, direction: Vector, footing: &Footing) -> f32 {
         let wide = self.radius_m + self.config.margin_m;
-        let mut free = self.heard_way(now, direction, flown, wide);
-        for thing in self.things(now, place) {
+        let mut free = self.heard_way(now, direction, footing.velocity, wide);
+        for thing in self.things(now, footing.place) {
             free = free.min(way_to(thing, direction, wide));
         }
         free
     }
 
-    /// The same of a disc of radius `wide` by the fresh echoes alone.
-    pub(super) fn heard_way(&self, now: u64, direction: Vector, flown: Vector, wide: f32) -> f32 {
+    /// Free way of a disc of radius `wide` by the fresh echoes alone, for a drone that has flown with `flown` since.
+    #[must_use]
+    pub fn heard_way(&self, now: u64, direction: Vector, flown: Vector, wide: f32) -> f32 {
         let half = self.config.cone_half_angle_deg.to_radians();
         let mut free = FAR_M;
         for hit in self.hits(now, flown) {
@@ -86,7 +87,6 @@ impl Shield {
         &self,
         now: u64,
         direction: Vector,
-        flown: Vector,
         footing: &Footing,
         walls: Option<&DistanceField>,
     ) -> f32 {
@@ -98,7 +98,7 @@ impl Shield {
             Sight::Gap | Sight::Cone => f32::INFINITY,
         };
         let braking = self.braking();
-        let speed = braking.speed(self.free_way(now, direction, flown, footing.place)).min(most);
+        let speed = braking.speed(self.free_way(now, direction, footing)).min(most);
         let (Some(walls), Some(place)) = (walls, footing.place) else { return speed };
         let sigma = if footing.sigma_m.is_finite() { footing.sigma_m.clamp(0.0, 0.08) } else { 0.08 };
         let soft = Self::plan_way(walls, place, direction, self.radius_m + c.plan_margin_m + sigma);
