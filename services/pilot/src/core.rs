@@ -5,7 +5,7 @@ use crate::config::PilotConfig;
 use crate::ground::Below;
 use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, age_s};
 use control::{
-    ClimbController, Failsafe, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp, Stage,
+    ClimbController, Delay, Failsafe, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp, Stage,
     Tilt, TouchDown, Vector, VelocityController, WayHome, wrap_angle,
 };
 use floorplan::{DistanceField, Plan};
@@ -128,6 +128,7 @@ pub struct PilotCore {
     pub(crate) velocity: VelocityController,
     pub(crate) below: Below,
     pub(crate) shield: Shield,
+    pub(crate) delay: Delay,
     pub(crate) spool: Option<SpoolUp>,
     pub(crate) touch: TouchDown,
 
@@ -186,6 +187,7 @@ impl PilotCore {
             velocity: VelocityController::new(velocity, config.motion.drag_per_s),
             below: Below::new(craft.beam_rest_m),
             shield: Shield::new(config.shield, craft.radius_m, craft.sides.iter().copied()),
+            delay: Delay::default(),
             spool: None,
             touch: TouchDown::default(),
             phase: Phase::Grounded,

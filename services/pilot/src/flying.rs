@@ -169,6 +169,8 @@ impl PilotCore {
         let clearance = self.height.clearance_m();
         let heading = self.heading();
         let wish = Wish { velocity: wish.velocity.limited(FASTEST * self.craft.cruise_m_s), ..wish };
+        self.delay.attitude(now, age_s(self.attitude.sampled, now));
+        self.shield.set_delay(self.delay.more_s(now));
         let guarded = self.shield.guard(now, wish, &self.footing(), self.walls.as_deref());
         // Who is lost comes down level, but for the drift that the floor itself shows.
         let velocity_known = age_s(self.pose.at, now) < RECKON_S

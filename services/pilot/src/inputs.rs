@@ -1,10 +1,10 @@
 //! What the pilot hears.
 
 use crate::core::PilotCore;
-use crate::senses::SetpointSeen;
-use control::{Echo, Look, Tilt, Vector, wrap_angle};
+use crate::senses::{SetpointSeen, age_s};
+use control::{Echo, GridView, Look, Tilt, Vector, wrap_angle};
 use ipc_types::{
-    Attitude, FlightState, FlowMotion, Patrol, PatrolState, Phase, Pose, Power, Setpoint, SonarHealth,
+    Attitude, FlightState, FlowMotion, GRID_SIDE, Grid, Patrol, PatrolState, Phase, Pose, Power, Setpoint, SonarHealth,
     SonarRanges, SonarStatus,
 };
 
@@ -108,6 +108,16 @@ impl PilotCore {
         }
     }
 
+    /// Takes navigation's grid, while the place that it is drawn around is believed.
+    pub fn grid(&mut self, message: &Grid) {
+        if !self.place_known() {
+            return;
+        }
+        let origin = Vector::new(message.origin_x_m, message.origin_y_m);
+        let view = GridView { origin, cell_m: message.cell_m, side: GRID_SIDE, cells: &message.cells };
+        self.shield.see(message.header.stamp_ns, self.motion.place(), &view);
+    }
+
     /// Takes a ping group.
     pub fn ranges(&mut self, message: &SonarRanges) {
         if message.count as usize > ipc_types::MAX_SONARS {
@@ -115,6 +125,10 @@ impl PilotCore {
             return;
         }
         self.shield.set_sweep(message.sweep_s);
+        let newest = message.filled().iter().map(|reading| reading.ping_ns).max();
+        if let (Some(now), Some(ping_ns)) = (self.last_step_ns, newest) {
+            self.delay.ping(now, age_s(Some(ping_ns), now));
+        }
         for reading in message.filled() {
             let (Some(status), Some(health)) =
                 (SonarStatus::from_code(reading.status), SonarHealth::from_code(reading.health))

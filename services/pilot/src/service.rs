@@ -4,7 +4,7 @@ use crate::config::PilotConfig;
 use crate::core::{Craft, PilotCore};
 use floorplan::DistanceField;
 use ipc_types::{
-    Attitude, Channels, Command, FlightState, FlowMotion, Patrol, PilotState, Pose, Power, Setpoint,
+    Attitude, Channels, Command, FlightState, FlowMotion, Grid, Patrol, PilotState, Pose, Power, Setpoint,
     SonarRanges, Text,
 };
 use runtime::{Input, Output, Ports, Service, Start, StartError};
@@ -20,6 +20,7 @@ pub struct Pilot {
     retained: Option<Box<PilotState>>,
     setpoint: Input<Setpoint>,
     patrol: Input<Patrol>,
+    grid: Input<Grid>,
     pose: Input<Pose>,
     ranges: Input<SonarRanges>,
     flow: Input<FlowMotion>,
@@ -44,6 +45,7 @@ impl Service for Pilot {
             core: PilotCore::new(config, Craft::of(start), Some((&plan, walls))),
             setpoint: ports.input()?,
             patrol: ports.input()?,
+            grid: ports.input()?,
             pose: ports.input()?,
             ranges: ports.input()?,
             flow: ports.input()?,
@@ -80,6 +82,9 @@ impl Service for Pilot {
         }
         while let Some(message) = self.ranges.receive() {
             core.ranges(&message);
+        }
+        if let Some(message) = self.grid.latest() {
+            core.grid(&message);
         }
         if let Some(message) = self.patrol.latest() {
             core.patrol(&message);

@@ -4,6 +4,8 @@
 //! law. No sensor looking that way, no motion that way.
 
 mod braking;
+mod delay;
+mod grid;
 mod guard;
 mod heard;
 mod remembered;
@@ -11,6 +13,8 @@ mod sight;
 mod ways;
 
 pub use braking::Braking;
+pub use delay::Delay;
+pub use grid::GridView;
 
 use crate::check::{RangeError, within};
 use crate::planar::Vector;
@@ -61,6 +65,8 @@ pub struct ShieldConfig {
     pub deceleration_m_s2: f32,
     /// Readings older than so many of the sensor's turns are worth nothing (DESIGN 4).
     pub stale_turns: f32,
+    /// Certainty from which a cell of navigation's grid stands, eighths of a reading.
+    pub grid_stands: u8,
     /// Room kept to the plan's walls beside the disc and the pose's sigma, metres: the plan is 3 cm wrong.
     pub plan_margin_m: f32,
     /// Speed at which the drone may still go where only a doubtful pose, and no echo, sees a wall, m/s.
@@ -90,6 +96,7 @@ impl Default for ShieldConfig {
             reaction_s: 0.35,
             deceleration_m_s2: 2.0,
             stale_turns: 2.0,
+            grid_stands: 5,
             plan_margin_m: 0.03,
             creep_m_s: 0.15,
             plan_near_m: 0.08,
@@ -117,6 +124,7 @@ impl ShieldConfig {
         within("shield.reaction_s", self.reaction_s, 0.2, 1.0)?;
         within("shield.deceleration_m_s2", self.deceleration_m_s2, 0.5, 2.5)?;
         within("shield.stale_turns", self.stale_turns, 1.5, 4.0)?;
+        within("shield.grid_stands", f32::from(self.grid_stands), 1.0, 255.0)?;
         within("shield.plan_margin_m", self.plan_margin_m, 0.0, 0.2)?;
         within("shield.creep_m_s", self.creep_m_s, 0.0, 0.3)?;
         within("shield.plan_near_m", self.plan_near_m, 0.0, 0.2)?;
@@ -197,8 +205,10 @@ pub struct Shield {
     radius_m: f32,
     sensors: [Option<Sensor>; MAX_SENSORS],
     remembered: Remembered,
+    grid: grid::Grid,
     glances: Glances,
     sweep_s: f32,
+    more_s: f32,
 }
 
 impl Shield {
@@ -220,15 +230,28 @@ impl Shield {
             radius_m,
             sensors,
             remembered: Remembered::new(),
+            grid: grid::Grid::new(),
             glances: Glances::new(),
             sweep_s: 0.24,
+            more_s: 0.0,
         }
     }
 
     /// Forgets what was heard a moment ago: the place is another one, and it lies elsewhere.
     pub fn forget(&mut self) {
         self.remembered = Remembered::new();
+        self.grid = grid::Grid::new();
         self.glances = Glances::new();
+    }
+
+    /// Takes navigation's certainty grid, for a drone at `place`.
+    pub fn see(&mut self, at_ns: u64, place: Vector, grid: &GridView<'_>) {
+        self.grid.see(at_ns, place, grid, self.config.grid_stands);
+    }
+
+    /// Sets by how much the messages are later than usual ([`Delay`]), seconds.
+    pub fn set_delay(&mut self, more_s: f32) {
+        self.more_s = if more_s.is_finite() { more_s.clamp(0.0, 2.0) } else { 2.0 };
     }
 
     /// Sets the period of a whole sweep through all sonars, seconds.
@@ -238,11 +261,11 @@ impl Shield {
         }
     }
 
-    /// The braking law at the present sweep.
+    /// The braking law at the present sweep and the measured delay.
     #[must_use]
     pub fn braking(&self) -> Braking {
         Braking {
-            delay_s: self.sweep_s + self.config.reaction_s,
+            delay_s: self.sweep_s + self.config.reaction_s + self.more_s,
             deceleration_m_s2: self.config.deceleration_m_s2,
         }
     }

@@ -41,9 +41,9 @@ impl Shield {
         free
     }
 
-    /// What was heard a moment ago, from the middle of the drone.
+    /// What was heard a moment ago or stands in the grid, from the middle of the drone.
     pub(super) fn things(&self, now: u64, place: Option<Vector>) -> impl Iterator<Item = Vector> + '_ {
-        place.into_iter().flat_map(move |place| self.remembered.things(now).map(move |thing| thing - place))
+        place.into_iter().flat_map(move |place| self.remembered.things(now).chain(self.grid.points(now)).map(move |thing| thing - place))
     }
 
     /// Free way of a disc of `radius` by the plan's walls. Inside the radius sliding along and away is free.
