@@ -11,6 +11,7 @@
 //! [`Core`] is everything without ports; [`Flight`] gives it those of the runtime.
 
 mod arming;
+mod asked;
 mod config;
 mod core;
 mod descent;
@@ -19,6 +20,7 @@ mod ladder;
 mod link;
 mod order;
 mod outbox;
+mod plausible;
 mod said;
 mod schedule;
 mod serial;
