@@ -137,7 +137,10 @@ fn a_flight_that_is_over_before_anything_breaks_fails() {
     let text = text.replace("from_s = 40", "from_s = 2");
     let scenario = Scenario::parse("early", &text).unwrap();
     let flown = fly(&scenario, &runtime::Cache::default()).unwrap();
-    assert_eq!((flown.seen.begun.clone(), failures(&scenario, &flown.seen)), (vec![true; 2], Vec::<String>::new()));
+    assert_eq!(
+        (flown.seen.begun.clone(), failures(&scenario, &flown.seen)),
+        (vec![true; 2], Vec::<String>::new())
+    );
 }
 
 /// In full flight no aircraft stands a moment later.

@@ -83,7 +83,8 @@ impl Layout<'_> for AttitudeAndImuReply {
             return Ok(Self { attitude, imu: None });
         }
         let length = usize::from(reader.u8()?);
-        if (1..RAW_IMU).contains(&length) {
+        let absent = length == 0 && reader.left() == 0;
+        if length < RAW_IMU && !absent {
             return Err(TooShort { length, needed: RAW_IMU });
         }
         let imu = reader.bytes(length)?;
