@@ -134,6 +134,12 @@ impl Link {
         now.saturating_sub(self.answer_ns.unwrap_or(self.opened_ns)) >= SILENT_NS
     }
 
+    /// Time since an attitude came, or since the port opened.
+    #[must_use]
+    pub fn unseen_ns(&self, now: u64) -> u64 {
+        now.saturating_sub(self.attitudes.seen_ns().unwrap_or(self.opened_ns))
+    }
+
     /// Everything that is asked once is known.
     #[must_use]
     pub fn identified(&self) -> bool {

@@ -41,6 +41,11 @@ impl Attitudes {
         self.believed.is_some_and(|(at, _)| now.saturating_sub(at) > OVERDUE_NS)
     }
 
+    /// When the last that is believed came.
+    pub(crate) fn seen_ns(&self) -> Option<u64> {
+        self.believed.map(|(at, _)| at)
+    }
+
     fn judge(&mut self, now: u64, reply: AttitudeReply) -> bool {
         let possible = reply.roll_decidegrees.unsigned_abs() <= 1800
             && reply.pitch_decidegrees.unsigned_abs() <= 1800
