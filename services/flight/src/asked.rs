@@ -2,7 +2,7 @@
 
 use crate::schedule::Question;
 
-/// A question that was not answered by then is lost; the slowest answer seen took a tenth of it.
+/// A question that was not answered by then is lost; the slowest answer of a sound line took a tenth of it.
 const LOST_NS: u64 = 250_000_000;
 /// One that nobody waits for is given longer, nearly until it is due again: its answer measures a slow line.
 const PATIENT_NS: u64 = 450_000_000;
@@ -11,8 +11,8 @@ const MOST_OUTSTANDING: usize = 3;
 /// From a question to its answer on a sound line, at most: 9 bytes there and 25 back in 3 ms, a pass of the controller's
 /// task in 10. The quickest of a few takes less, and a sound line is held up by nothing.
 const SOUND_TRIP_NS: u64 = 13_000_000;
-/// Newest round trips that are remembered: two seconds of them.
-const TRIPS: usize = 5;
+/// Newest round trips that are remembered, of some seven a second: so many late ones in a row are no hiccup.
+const TRIPS: usize = 3;
 
 /// Which questions are on their way.
 ///
@@ -87,10 +87,11 @@ impl Asked {
     }
 }
 
-/// The voltage and the motors are asked for seldom and for the record: they can wait, and are never asked twice meanwhile.
+/// What is asked for again and again can wait: nothing is asked twice meanwhile, so that its answer is its own. A `flight`
+/// that begins in the air cannot.
 fn patience_ns(question: Question) -> u64 {
     match question {
-        Question::Attitude | Question::Analog | Question::Motor => PATIENT_NS,
+        Question::Attitude | Question::Status | Question::Analog | Question::Motor => PATIENT_NS,
         _ => LOST_NS,
     }
 }
@@ -172,7 +173,7 @@ mod tests {
             asked.answered(trip * MS, Question::Analog);
         }
         assert_eq!(asked.held_up_ns(), 0);
-        for at in 0..5 {
+        for at in 0..3 {
             asked.sent(at * 1_000 * MS, Question::Motor);
             asked.expire((at * 1_000 + 320) * MS);
             assert!(asked.answered((at * 1_000 + 323 + at) * MS, Question::Motor));

@@ -134,7 +134,7 @@ impl Core {
             Profile::Receiver => armed,
             Profile::Override => None,
         };
-        let decision = self.ladder.decide(now, self.wish.as_ref(), believed, self.link.unseen_ns(now));
+        let decision = self.ladder.decide(now, self.wish.as_ref(), believed, self.link.view(now));
         // Before anything is known the arm switch has no position: a low one would drop an aircraft in the air. Beside a
         // radio it is the neutral throttle that would, and the controller goes on with the last sticks meanwhile.
         let known = match self.config.profile {
@@ -345,7 +345,7 @@ impl Core {
             }
             _ => match self.ladder.current() {
                 Step::Level | Step::Descend if self.ladder.unseen() => {
-                    out.write_str("the controller tells no attitude: coming down level")
+                    out.write_str("the controller answers too late or not at all: coming down level")
                 }
                 Step::Level | Step::Descend => out.write_str("the pilot is silent: coming down level"),
                 Step::Following | Step::TouchDown | Step::Neutral => Ok(()),

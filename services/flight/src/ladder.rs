@@ -8,7 +8,8 @@
 //! ```
 //! The same steps are taken for a pilot that is there, while the controller tells no attitude: commands still arrive, but
 //! sticks by a tilt that nobody knows fly into a wall within two seconds. There it is level after 300 ms, with the
-//! pilot's throttle, which needs no attitude, and down after 1 s.
+//! pilot's throttle, which needs no attitude, and down after 1 s. On a line that is too slow it is the pilot's height loop
+//! that fails first: it comes down at once, under `flight`'s slower one, by the pilot's sticks.
 //!
 //! A pilot that comes back is followed at once, and so is one that can see again. Before there is any pilot, a disarmed aircraft gets neutral
 //! frames and an armed one is an orphan on the second step. On the ground the throttle goes low instead.
@@ -23,6 +24,21 @@ use ipc_types::Ladder as Step;
 const UNSEEN_LEVEL_NS: u64 = 300_000_000;
 /// ... and it comes down: what drifts level is in the next wall after a few seconds. As for a down sonar that is silent.
 const UNSEEN_DESCEND_NS: u64 = 1_000_000_000;
+
+/// What the controller tells of the tilt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum View {
+    /// The newest attitude is so old, nanoseconds.
+    Seen(u64),
+    /// Attitudes come, and they and what is sent are held up for longer than can be flown by.
+    Late,
+}
+
+impl View {
+    fn is_clear(self) -> bool {
+        matches!(self, Self::Seen(age_ns) if age_ns < UNSEEN_LEVEL_NS)
+    }
+}
 
 /// What to send.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,6 +65,8 @@ pub struct Ladder {
     step: Step,
     /// The step was taken because the controller tells no attitude.
     unseen: bool,
+    /// Roll and pitch that kept it level while the attitude was known: what the pilot learns without it is nonsense.
+    level_us: (u16, u16),
 }
 
 impl Ladder {
@@ -63,6 +81,7 @@ impl Ladder {
             latched: false,
             step: Step::Neutral,
             unseen: false,
+            level_us: (CENTRE_US, CENTRE_US),
         }
     }
 
@@ -95,21 +114,18 @@ impl Ladder {
         wish.expiry_ns.min(wish.stamp_ns.saturating_add(self.level_ns))
     }
 
-    /// Decides what is sent now. `armed`: what the controller says, once it is believed; `unseen_ns`: since when it has
-    /// told no attitude.
-    pub fn decide(
-        &mut self,
-        now: u64,
-        wish: Option<&Wish>,
-        armed: Option<bool>,
-        unseen_ns: u64,
-    ) -> Decision {
+    /// Decides what is sent now. `armed`: what the controller says, once it is believed; `view`: what it tells of
+    /// the tilt.
+    pub fn decide(&mut self, now: u64, wish: Option<&Wish>, armed: Option<bool>, view: View) -> Decision {
         let fresh = wish.is_some_and(|wish| now < self.stale_ns(wish));
         let flies = wish.is_some_and(|wish| wish.arm && !wish.on_ground) && !self.latched;
-        self.unseen = fresh && flies && unseen_ns >= UNSEEN_LEVEL_NS;
+        self.unseen = fresh && flies && !view.is_clear();
+        if let Some(wish) = wish.filter(|_| view.is_clear()) {
+            self.level_us = (wish.level_roll_us, wish.level_pitch_us);
+        }
         let decision = match wish {
             None => Self::rest(Step::Neutral),
-            Some(wish) if self.unseen => self.without_attitude(now, wish, armed, unseen_ns),
+            Some(wish) if self.unseen => self.without_attitude(now, wish, armed, view),
             Some(wish) if fresh => self.follow(wish),
             Some(_) if self.latched => Self::rest(Step::TouchDown),
             Some(wish) if !wish.arm => Self::rest(Step::Neutral),
@@ -138,19 +154,29 @@ impl Ladder {
         Decision { channels_us, count: wish.count, step: Step::Following, arm: wish.arm && !self.latched }
     }
 
-    /// The pilot flies, and nobody knows the tilt.
-    fn without_attitude(&mut self, now: u64, wish: &Wish, armed: Option<bool>, unseen_ns: u64) -> Decision {
-        if unseen_ns >= UNSEEN_DESCEND_NS {
-            return self.down(now, wish, armed, 0);
+    /// The pilot flies, and nobody knows the tilt well enough.
+    fn without_attitude(&mut self, now: u64, wish: &Wish, armed: Option<bool>, view: View) -> Decision {
+        match view {
+            View::Seen(age_ns) if age_ns < UNSEEN_DESCEND_NS => {
+                self.level(wish, Step::Level, wish.channels_us[THROTTLE])
+            }
+            View::Seen(_) => self.down(now, wish, armed, 0),
+            View::Late => {
+                let mut decision = self.down(now, wish, armed, 0);
+                if decision.step == Step::Descend {
+                    for stick in [ROLL, PITCH, YAW] {
+                        decision.channels_us[stick] = wish.channels_us[stick];
+                    }
+                }
+                decision
+            }
         }
-        Self::level(wish, Step::Level, wish.channels_us[THROTTLE])
     }
 
     /// Level with the learned trim.
-    fn level(wish: &Wish, step: Step, throttle_us: u16) -> Decision {
+    fn level(&self, wish: &Wish, step: Step, throttle_us: u16) -> Decision {
         let mut channels_us = wish.channels_us;
-        channels_us[ROLL] = wish.level_roll_us;
-        channels_us[PITCH] = wish.level_pitch_us;
+        (channels_us[ROLL], channels_us[PITCH]) = self.level_us;
         channels_us[YAW] = CENTRE_US;
         channels_us[THROTTLE] = throttle_us;
         Decision { channels_us, count: wish.count, step, arm: true }
@@ -163,7 +189,7 @@ impl Ladder {
             return self.down(now, wish, armed, waited);
         }
         let hover_us = wish.hover_us.map_or(wish.channels_us[THROTTLE], |hover| hover.round() as u16);
-        Self::level(wish, Step::Level, if wish.on_ground { LOW_US } else { hover_us })
+        self.level(wish, Step::Level, if wish.on_ground { LOW_US } else { hover_us })
     }
 
     /// Down by the own height loop. `waited`: how old what the pilot knew is.
@@ -177,7 +203,7 @@ impl Ladder {
             self.descent.begin(now, hover, height_m, wish.climb_m_s);
         }
         match self.descent.step(now).filter(|fall| !over && !fall.touched) {
-            Some(fall) => Self::level(wish, Step::Descend, fall.throttle_us.round() as u16),
+            Some(fall) => self.level(wish, Step::Descend, fall.throttle_us.round() as u16),
             None => {
                 self.latched = true;
                 Self::rest(Step::TouchDown)

@@ -33,7 +33,7 @@ pub use arming::{ArmSwitch, Evidence};
 pub use config::{Config, Profile};
 pub use core::Core;
 pub use descent::{Descent, DescentStep};
-pub use ladder::{Decision, Ladder};
+pub use ladder::{Decision, Ladder, View};
 pub use link::{FrameError, Link, MAX_FRAME};
 pub use order::{ReceiverOrder, throttle_of};
 pub use outbox::Outbox;

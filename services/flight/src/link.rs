@@ -3,6 +3,7 @@
 use crate::arming::Evidence;
 use crate::asked::{Asked, Together};
 use crate::framing::Framing;
+use crate::ladder::View;
 use crate::order::{ReceiverOrder, throttle_of};
 use crate::plausible::Attitudes;
 use crate::said::{AttitudeSample, Counts, Identity, Said, question_of, write};
@@ -21,6 +22,9 @@ const SPACING_NS: u64 = 8_000_000;
 /// with the accelerometer.
 const ON_THE_WAY_NS: u64 = 3_500_000;
 const ON_THE_WAY_WITH_IMU_NS: u64 = 5_300_000;
+/// A line that holds bytes up for so long, each way, cannot be flown by: in the simulator 30 ms are a hover, from 50 ms on the
+/// pilot's height loop swings until it meets the floor.
+const TOO_SLOW_NS: u64 = 40_000_000;
 /// Half a frame and then nothing for so long: the rest will not come.
 const QUIET_NS: u64 = 50_000_000;
 /// The receiver's order is waited for this long before it is taken for AETR: two passes of the task and more.
@@ -134,10 +138,15 @@ impl Link {
         now.saturating_sub(self.answer_ns.unwrap_or(self.opened_ns)) >= SILENT_NS
     }
 
-    /// Time since an attitude came, or since the port opened.
+    /// What the controller tells of the tilt; before the first attitude as if one had come when the port opened.
     #[must_use]
-    pub fn unseen_ns(&self, now: u64) -> u64 {
-        now.saturating_sub(self.attitudes.seen_ns().unwrap_or(self.opened_ns))
+    pub fn view(&self, now: u64) -> View {
+        let age_ns = now.saturating_sub(self.attitudes.seen_ns().unwrap_or(self.opened_ns));
+        if age_ns < SILENT_NS && self.asked.held_up_ns() >= TOO_SLOW_NS {
+            View::Late
+        } else {
+            View::Seen(age_ns)
+        }
     }
 
     /// Everything that is asked once is known.

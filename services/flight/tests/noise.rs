@@ -5,8 +5,10 @@ mod common;
 mod rig;
 
 use airframe::controller::Firmware;
-use common::{Controller, MS, World};
+use common::{Controller, MS, Pilot, World};
+use ipc_types::Ladder;
 use rig::Rig;
+use std::collections::VecDeque;
 
 #[test]
 fn attitudes_are_asked_for_though_the_last_was_not_answered() {
@@ -103,4 +105,90 @@ fn an_attitude_of_nobody_is_not_told() {
     world.controller.attitude = [0, 700, 0];
     world.run(200);
     assert!(world.attitudes.last().unwrap().pitch_rad > 1.2);
+}
+
+/// Roll, pitch, throttle and yaw that the controller has, in its order: roll, pitch, yaw, throttle.
+fn sticks(world: &World) -> [u16; 4] {
+    [world.controller.rc[0], world.controller.rc[1], world.controller.rc[3], world.controller.rc[2]]
+}
+
+#[test]
+fn without_attitude_it_is_level_and_then_comes_down_though_the_pilot_speaks() {
+    let mut world = World::airborne(1.2);
+    world.run(1_000);
+    assert_eq!(sticks(&world), [1530, 1500, 1450, 1500]);
+    world.controller.mute = true;
+    world.run(250);
+    assert_eq!(sticks(&world), [1530, 1500, 1450, 1500], "a gap is a gap");
+    world.run(100);
+    // What the pilot learns of the trim from now on is nonsense.
+    world.pilot = Some(Pilot { level_roll: 1580.0, ..Pilot::HOVER });
+    world.run(100);
+    assert_eq!(sticks(&world), [1504, 1500, 1450, 1500]);
+    assert_eq!(world.state().ladder, Ladder::Level.code());
+    assert!(world.reason().contains("too late or not at all"), "{}", world.reason());
+    // It is told again: the pilot is followed again.
+    world.controller.mute = false;
+    world.run(200);
+    assert_eq!(sticks(&world), [1530, 1500, 1450, 1500]);
+    assert_eq!(world.state().ladder, Ladder::Following.code());
+    world.controller.mute = true;
+    world.run(1_200);
+    assert_eq!((sticks(&world)[0], world.state().ladder), (1580, Ladder::Descend.code()));
+    world.run(9_000);
+    assert!(!world.controller.armed && world.z < 0.01, "{} m, {}", world.z, world.reason());
+    let impact = world.impact.unwrap();
+    assert!(impact < 0.7, "{impact} m/s");
+    // And stays there whatever the pilot wants.
+    world.controller.mute = false;
+    world.run(3_000);
+    assert!(!world.controller.armed);
+}
+
+#[test]
+fn on_the_ground_a_silent_controller_changes_nothing() {
+    let mut world = World::new(Controller::new());
+    world.pilot = Some(Pilot { arm: true, ..Pilot::IDLE });
+    world.run(3_000);
+    assert!(world.controller.armed, "{}", world.reason());
+    world.controller.mute = true;
+    world.run(3_000);
+    assert!(world.controller.armed);
+    assert_eq!(world.state().ladder, Ladder::Following.code());
+}
+
+/// Both ways later by so many ticks of 5 ms.
+fn delayed(ticks: usize) -> rig::Spoil {
+    let mut held = [VecDeque::new(), VecDeque::new()];
+    Box::new(move |to, bytes| {
+        let way = &mut held[usize::from(to)];
+        way.push_back(bytes);
+        if way.len() > ticks { way.pop_front().unwrap() } else { Vec::new() }
+    })
+}
+
+#[test]
+fn a_line_too_slow_to_fly_by_is_come_down_by_and_a_slower_one_is_flown() {
+    let mut rig = Rig::hovering(Firmware::Betaflight2025_12);
+    rig.spoil = Some(delayed(6));
+    rig.run(5.0);
+    rig.expect_hover();
+    let (told, now) = (rig.attitudes.last().unwrap(), rig.now());
+    // 30 ms on the way back, some ms on the wire, and up to 33 since it came.
+    let age_ms = (now - told.sampled_ns) / MS;
+    assert!((25..90).contains(&age_ms), "{age_ms} ms");
+    assert_eq!(rig.core.state(now).ladder, Ladder::Following.code());
+
+    rig.spoil = Some(delayed(30));
+    rig.run(1.5);
+    assert_eq!(rig.core.state(rig.now()).ladder, Ladder::Descend.code(), "{}", rig.reason());
+    let mut fastest = 0.0_f32;
+    for _ in 0..200 {
+        rig.run(0.05);
+        if rig.height_m() > 0.02 {
+            fastest = -rig.flight.truth().velocity_m_s[2].min(0.0);
+        }
+    }
+    assert!(rig.height_m() < 0.05 && !rig.armed(), "{} m, {}", rig.height_m(), rig.reason());
+    assert!(fastest < 0.7, "{fastest} m/s");
 }
