@@ -2,8 +2,9 @@
 
 use crate::arming::ArmSwitch;
 use crate::config::{Config, Profile};
+use crate::frame::MAX_FRAME;
 use crate::ladder::{Decision, Ladder};
-use crate::link::{Link, MAX_FRAME};
+use crate::link::Link;
 use crate::outbox::Outbox;
 use crate::stick::StickLaw;
 use crate::wish::{AUX_ARM, HIGH_US, LOW_US, Wish, neutral};

@@ -160,7 +160,11 @@ impl Ladder {
             View::Seen(age_ns) if age_ns < UNSEEN_DESCEND_NS => {
                 self.level(wish, Step::Level, wish.channels_us[THROTTLE])
             }
-            View::Seen(_) => self.down(now, wish, armed, 0),
+            View::Seen(_) => {
+                let decision = self.down(now, wish, armed, 0);
+                self.descent.hurry();
+                decision
+            }
             View::Late => {
                 let mut decision = self.down(now, wish, armed, 0);
                 if decision.step == Step::Descend {

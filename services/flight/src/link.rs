@@ -2,6 +2,7 @@
 
 use crate::arming::Evidence;
 use crate::asked::{Asked, Together};
+use crate::frame::{FrameError, MAX_FRAME, fill};
 use crate::framing::Framing;
 use crate::ladder::View;
 use crate::order::{ReceiverOrder, throttle_of};
@@ -12,7 +13,7 @@ use msp::messages::{
     Analog, ApiVersion, Arming, Attitude, AttitudeAndImu, BoxIds, FcVariant, FcVersion, Motor, Rc, RxMap,
     SetRawRc, Status,
 };
-use msp::{Decoder, Direction, EncodeError, Frame, Request, Version, encode_request, parse_reply};
+use msp::{Decoder, Direction, Frame, Request, Version, encode_request, parse_reply};
 
 /// Without any answer for so long the controller is silent.
 const SILENT_NS: u64 = 1_000_000_000;
@@ -34,11 +35,6 @@ const STATUS_OLD_NS: u64 = 500_000_000;
 /// Longest answer that is waited for: more is a damaged length. INAV's list of boxes may be 60 bytes and its channels
 /// are 68.
 const LONGEST: usize = 128;
-/// Between two commands. A controller that misses a byte takes the next one for the check byte: this one instead of the next
-/// command's `$`, with which that would be lost too. Outside of a frame it says nothing to any firmware.
-const FILLER: u8 = 0;
-/// The longest frame sent: version 2 with 18 channels is 45 bytes, and the filler.
-pub const MAX_FRAME: usize = 64;
 
 /// Permanent ids of modes and the bits that `flight/state` gives them.
 const MODES: [(u8, u32); 4] = [(0, 1), (1, 2), (27, 4), (50, 8)];
@@ -402,24 +398,4 @@ impl Link {
         self.asked_since_frame = true;
         Some(length)
     }
-}
-
-/// Puts the filler behind a command.
-fn fill(out: &mut [u8; MAX_FRAME], length: usize) -> usize {
-    match out.get_mut(length) {
-        Some(slot) => {
-            *slot = FILLER;
-            length + 1
-        }
-        None => length,
-    }
-}
-
-/// Why a frame of channels was not written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrameError {
-    /// A channel out of range, or none.
-    Channels(msp::messages::Refusal),
-    /// It does not fit.
-    Encode(EncodeError),
 }
