@@ -74,9 +74,9 @@ pub struct Refused {
 /// A frame that fails is not thrown away whole: its bytes after the `$` are looked through again, because a
 /// lost byte makes a frame swallow the head of the next one.
 ///
-/// A frame that is not complete yet gives way to one that is and stands inside it: a damaged length announces up to
-/// a whole buffer, and would hold everything back until that has come, to hand it out as if it were new. (So a payload
-/// in which a whole frame stands cannot be carried; no message of MSP has one.)
+/// A frame gives way to a whole one inside it when much of it would still have to come: a damaged length announces up to a
+/// whole buffer, and would hold everything back until that has come, to hand it out as if it were new. (So a long
+/// payload in which a whole frame stands cannot be carried; no message of MSP has one.)
 #[derive(Clone, Debug)]
 pub struct Decoder<const N: usize> {
     buffer: [u8; N],
@@ -102,9 +102,12 @@ struct Found {
     end: usize,
 }
 
+/// What comes with so few bytes more is waited for: two or three answers of a flight controller.
+const SOON: usize = 32;
+
 enum Head {
-    /// May become a frame with more bytes.
-    Incomplete,
+    /// May become a frame with more bytes; where it would end, once that is known.
+    Incomplete(Option<usize>),
     /// The first so many bytes are no frame.
     Junk(usize),
     /// Announces more than the buffer holds.
@@ -143,8 +146,8 @@ impl<const N: usize> Decoder<N> {
         self.spent = 0;
         loop {
             match head::<N>(self.buffer.get(..self.filled).unwrap_or(&[])) {
-                Head::Incomplete => {
-                    let inside = self.inside(self.filled)?;
+                Head::Incomplete(end) => {
+                    let inside = self.inside(end?)?;
                     self.give_way(inside);
                 }
                 Head::Junk(count) => self.discard(count),
@@ -228,10 +231,11 @@ impl<const N: usize> Decoder<N> {
         }
     }
 
-    /// Where a complete frame stands behind the beginning of another one that would reach to `end`.
+    /// Where a whole frame stands in the one at the front, which would go on to `end` for a while.
     fn inside(&self, end: usize) -> Option<usize> {
-        let bytes = self.buffer.get(..end.min(self.filled)).unwrap_or(&[]);
-        (1..bytes.len()).find(|from| {
+        let last = end.checked_sub(SOON)?.min(self.filled);
+        let bytes = self.buffer.get(..last)?;
+        (1..last).find(|from| {
             let rest = bytes.get(*from..).unwrap_or(&[]);
             rest.first() == Some(&b'$') && matches!(head::<N>(rest), Head::Complete(_))
         })
@@ -246,18 +250,18 @@ impl<const N: usize> Decoder<N> {
 
 /// What stands at the front of `bytes`, for a buffer of `N`.
 fn head<const N: usize>(bytes: &[u8]) -> Head {
-    let Some(&first) = bytes.first() else { return Head::Incomplete };
+    let Some(&first) = bytes.first() else { return Head::Incomplete(None) };
     if first != b'$' {
         return Head::Junk(bytes.iter().position(|byte| *byte == b'$').unwrap_or(bytes.len()));
     }
     let version = match bytes.get(1) {
-        None => return Head::Incomplete,
+        None => return Head::Incomplete(None),
         Some(b'M') => Version::V1,
         Some(b'X') => Version::V2,
         Some(_) => return Head::Junk(1),
     };
     let direction = match bytes.get(2) {
-        None => return Head::Incomplete,
+        None => return Head::Incomplete(None),
         Some(&character) => match Direction::from_character(character) {
             Some(direction) => direction,
             None => return Head::Junk(1),
@@ -276,14 +280,14 @@ fn head<const N: usize>(bytes: &[u8]) -> Head {
             8,
             usize::from(u16::from_le_bytes([*length0, *length1])),
         ),
-        _ => return Head::Incomplete,
+        _ => return Head::Incomplete(None),
     };
     let end = payload + length + 1;
     if end > N {
         return Head::Oversize;
     }
     let (Some(checked), Some(check)) = (bytes.get(3..end - 1), bytes.get(end - 1)) else {
-        return Head::Incomplete;
+        return Head::Incomplete(Some(end));
     };
     let sum = match version {
         Version::V1 => xor(checked),

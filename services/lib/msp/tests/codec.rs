@@ -151,6 +151,23 @@ fn a_frame_larger_than_the_buffer_is_refused_at_once() {
 }
 
 #[test]
+fn frames_swallowed_by_a_false_head_come_out_together() {
+    // A head that claims 18 bytes, then three whole frames of 6: the last byte finishes and unmasks it.
+    let mut stream = b"$M>\x12\x6c".to_vec();
+    for _ in 0..4 {
+        stream.extend_from_slice(b"$M<\x00\x6c\x6c");
+    }
+    assert_eq!(decode(&stream).len(), 4);
+}
+
+#[test]
+fn a_short_payload_may_be_a_frame() {
+    // What a flow sensor sees may be anything.
+    let frame = (Version::V2, Direction::Request, 0x1f02, b"$X<\x00\x64\x00\x00\x00\x8f".to_vec());
+    assert_eq!(decode(&bytes_of(&frame)), [frame]);
+}
+
+#[test]
 fn a_damaged_length_hides_nothing_that_follows() {
     // A head that claims 128 bytes (one bit of a length of 0), then whole frames: each comes out with its last byte.
     let mut decoder = Decoder::<512>::new();
