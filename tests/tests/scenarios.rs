@@ -43,6 +43,13 @@ fn nonsense_in_a_file_is_refused_by_name() {
         (good.replace("take-off", "goto"), "goto needs it"),
         (good.replace("take-off\"", "take-off\"\nat_s = 3"), "begins the flight"),
         (good.replace("down.\n", "down.\nflight_s = 0.0\n"), "flight_s"),
+        (
+            good.replace(
+                "[expect]",
+                "[[orders]]\norder = \"hold\"\nat_s = 9\n[[orders]]\norder = \"land\"\nat_s = 3\n[expect]",
+            ),
+            "order of their times",
+        ),
         (good.replace("[expect]", "[[faults]]\nkind = \"sonar-dead\"\n[expect]"), "sonars is missing"),
     ] {
         let error = format!("{:#}", Scenario::parse("bad", &text).unwrap_err());
@@ -112,6 +119,43 @@ fn expectations_that_are_false_fail_and_leave_a_picture() {
     let report = run(&[right], &known, &settings, |_| {}).unwrap();
     assert_eq!(report.scenarios[0].verdict, Verdict::NoLongerAShortfall);
     assert!(!report.is_good());
+}
+
+#[test]
+fn a_flight_that_is_over_before_anything_breaks_fails() {
+    let text = std::fs::read_to_string(directory().join("down-dead-hover.toml")).unwrap();
+    let land = "[[orders]]\norder = \"land\"\nat_s = 3\n\n[[faults]]";
+    let late = text.replace("[[faults]]", land).replace("from_s = 8", "from_s = 40");
+    let head = late.split("[expect]").next().unwrap();
+    let scenario = Scenario::parse("late", &format!("{head}[expect]\nlanded = true\n")).unwrap();
+    let flown = fly(&scenario, &runtime::Cache::default()).unwrap();
+    let told = failures(&scenario, &flown.seen);
+    assert!(told.len() == 1 && told[0].contains("over before fault 1 began at 40 s"), "{told:?}");
+    // Each fault counts by itself, and one that is there from the start always holds.
+    let early = "[[faults]]\nkind = \"sonar-spikes\"\nsonars = [\"sides\"]\nshare = 0.01\n\n[expect]";
+    let text = format!("{head}[expect]\nlanded = true\n").replace("[expect]", early);
+    let text = text.replace("from_s = 40", "from_s = 2");
+    let scenario = Scenario::parse("early", &text).unwrap();
+    let flown = fly(&scenario, &runtime::Cache::default()).unwrap();
+    assert_eq!(
+        (flown.seen.begun.clone(), failures(&scenario, &flown.seen)),
+        (vec![true; 2], Vec::<String>::new())
+    );
+}
+
+/// In full flight no aircraft stands a moment later.
+#[test]
+fn a_stop_that_comes_too_late_fails() {
+    let text = std::fs::read_to_string(directory().join("sides-dead-goto.toml")).unwrap();
+    let head = text.split("[expect]").next().unwrap();
+    let told = |within: &str| {
+        let text = format!("{head}[expect]\nstopped_within_s = {within}\n");
+        let scenario = Scenario::parse("stop", &text).unwrap();
+        failures(&scenario, &fly(&scenario, &runtime::Cache::default()).unwrap().seen)
+    };
+    let late = told("0.1");
+    assert!(late.len() == 1 && late[0].contains("to stop within 0.1 s of the fault"), "{late:?}");
+    assert_eq!(told("5.0"), Vec::<String>::new());
 }
 
 #[test]

@@ -2,8 +2,9 @@
 
 use crate::arming::ArmSwitch;
 use crate::config::{Config, Profile};
+use crate::frame::MAX_FRAME;
 use crate::ladder::{Decision, Ladder};
-use crate::link::{Link, MAX_FRAME};
+use crate::link::Link;
 use crate::outbox::Outbox;
 use crate::stick::StickLaw;
 use crate::wish::{AUX_ARM, HIGH_US, LOW_US, Wish, neutral};
@@ -134,7 +135,7 @@ impl Core {
             Profile::Receiver => armed,
             Profile::Override => None,
         };
-        let decision = self.ladder.decide(now, self.wish.as_ref(), believed);
+        let decision = self.ladder.decide(now, self.wish.as_ref(), believed, self.link.view(now));
         // Before anything is known the arm switch has no position: a low one would drop an aircraft in the air. Beside a
         // radio it is the neutral throttle that would, and the controller goes on with the last sticks meanwhile.
         let known = match self.config.profile {
@@ -344,6 +345,9 @@ impl Core {
                 write!(out, "{ARM_WITH_THE_RADIO}: in this set-up only its pilot can")
             }
             _ => match self.ladder.current() {
+                Step::Level | Step::Descend if self.ladder.unseen() => {
+                    out.write_str("the controller answers too late or not at all: coming down level")
+                }
                 Step::Level | Step::Descend => out.write_str("the pilot is silent: coming down level"),
                 Step::Following | Step::TouchDown | Step::Neutral => Ok(()),
             },

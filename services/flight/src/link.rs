@@ -1,38 +1,40 @@
 //! The conversation with the flight controller: bytes in, bytes out, time as an argument.
 
 use crate::arming::Evidence;
+use crate::asked::{Asked, Together};
+use crate::frame::{FrameError, MAX_FRAME, fill};
 use crate::framing::Framing;
+use crate::ladder::View;
 use crate::order::{ReceiverOrder, throttle_of};
+use crate::plausible::Attitudes;
 use crate::said::{AttitudeSample, Counts, Identity, Said, question_of, write};
 use crate::schedule::{Question, Schedule};
 use msp::messages::{
     Analog, ApiVersion, Arming, Attitude, AttitudeAndImu, BoxIds, FcVariant, FcVersion, Motor, Rc, RxMap,
     SetRawRc, Status,
 };
-use msp::{Decoder, Direction, EncodeError, Frame, Request, Version, encode_request, parse_reply};
+use msp::{Decoder, Direction, Frame, Request, Version, encode_request, parse_reply};
 
 /// Without any answer for so long the controller is silent.
 const SILENT_NS: u64 = 1_000_000_000;
-/// A question that was not answered by then is lost; the slowest answer seen took a tenth of it.
-const LOST_NS: u64 = 250_000_000;
-/// Questions on the way at once; with the frames far below the controller's 192-byte buffer.
-const MOST_OUTSTANDING: usize = 3;
 /// Least time between two commands: nearly one pass of the controller's task.
 const SPACING_NS: u64 = 8_000_000;
 /// From the reading of the attitude to now: an answer of 12 bytes at 115200 baud and half a tick of 5 ms; of 32 bytes
 /// with the accelerometer.
 const ON_THE_WAY_NS: u64 = 3_500_000;
 const ON_THE_WAY_WITH_IMU_NS: u64 = 5_300_000;
-/// So many questions for attitude and accelerometer in one that were never answered: the firmware does not know it.
-const MOST_UNANSWERED: u8 = 3;
+/// A line that holds bytes up for so long, each way, cannot be flown by: in the simulator 30 ms are a hover, from 50 ms on the
+/// pilot's height loop swings until it meets the floor.
+const TOO_SLOW_NS: u64 = 40_000_000;
 /// Half a frame and then nothing for so long: the rest will not come.
 const QUIET_NS: u64 = 50_000_000;
 /// The receiver's order is waited for this long before it is taken for AETR: two passes of the task and more.
 const ORDER_WAIT_NS: u64 = 40_000_000;
 /// A status older than this says nothing about arming.
 const STATUS_OLD_NS: u64 = 500_000_000;
-/// The longest frame sent: version 2 with 18 channels is 45 bytes.
-pub const MAX_FRAME: usize = 64;
+/// Longest answer that is waited for: more is a damaged length. INAV's list of boxes may be 60 bytes and its channels
+/// are 68.
+const LONGEST: usize = 128;
 
 /// Permanent ids of modes and the bits that `flight/state` gives them.
 const MODES: [(u8, u32); 4] = [(0, 1), (1, 2), (27, 4), (50, 8)];
@@ -41,10 +43,9 @@ const MODES: [(u8, u32); 4] = [(0, 1), (1, 2), (27, 4), (50, 8)];
 #[derive(Debug, Clone)]
 pub struct Link {
     framing: Framing,
-    decoder: Decoder<1024>,
+    decoder: Decoder<LONGEST>,
     schedule: Schedule,
-    /// When each question that is on its way was sent.
-    asked_ns: [Option<u64>; 10],
+    asked: Asked,
     /// Which questions of [`Question::once`] are answered (or refused, which is an answer).
     settled: [bool; 10],
     opened_ns: u64,
@@ -59,11 +60,8 @@ pub struct Link {
     box_index: [Option<u8>; 4],
     order: Option<ReceiverOrder>,
     identity: Identity,
-    /// Whether the attitude is asked for together with the accelerometer, whether that was ever answered, and how often
-    /// it was not.
-    imu: bool,
-    imu_answered: bool,
-    imu_lost: u8,
+    together: Together,
+    attitudes: Attitudes,
     /// What the controller said.
     pub said: Said,
 }
@@ -76,7 +74,7 @@ impl Link {
             framing: Framing::new(now, msp_version),
             decoder: Decoder::new(),
             schedule: Schedule::new(now),
-            asked_ns: [None; 10],
+            asked: Asked::default(),
             settled: [false; 10],
             opened_ns: now,
             byte_ns: now,
@@ -89,9 +87,8 @@ impl Link {
             box_index: [Some(0), Some(1), None, None],
             order: None,
             identity: Identity::default(),
-            imu: true,
-            imu_answered: false,
-            imu_lost: 0,
+            together: Together::default(),
+            attitudes: Attitudes::default(),
             said: Said::default(),
         }
     }
@@ -135,6 +132,17 @@ impl Link {
     #[must_use]
     pub fn silent(&self, now: u64) -> bool {
         now.saturating_sub(self.answer_ns.unwrap_or(self.opened_ns)) >= SILENT_NS
+    }
+
+    /// What the controller tells of the tilt; before the first attitude as if one had come when the port opened.
+    #[must_use]
+    pub fn view(&self, now: u64) -> View {
+        let age_ns = now.saturating_sub(self.attitudes.seen_ns().unwrap_or(self.opened_ns));
+        if age_ns < SILENT_NS && self.asked.held_up_ns() >= TOO_SLOW_NS {
+            View::Late
+        } else {
+            View::Seen(age_ns)
+        }
     }
 
     /// Everything that is asked once is known.
@@ -214,7 +222,7 @@ impl Link {
         if self.silent(now) {
             // Whoever answers after a silence may have restarted, or be another one.
             self.settled = [false; 10];
-            (self.imu, self.imu_answered, self.imu_lost) = (true, false, 0);
+            self.together = Together::default();
         }
         let answered = match frame.direction {
             Direction::Request => false,
@@ -222,8 +230,7 @@ impl Link {
             direction => match question_of(frame.code) {
                 Some(question) => {
                     if frame.code == AttitudeAndImu::CODE {
-                        self.imu &= direction != Direction::Refusal;
-                        self.imu_answered |= self.imu;
+                        self.together.answered(direction != Direction::Refusal);
                     }
                     self.answer(now, question, direction, frame)
                 }
@@ -247,22 +254,19 @@ impl Link {
     }
 
     fn answer(&mut self, now: u64, question: Question, direction: Direction, frame: &Frame<'_>) -> bool {
-        let Some(sent_ns) = self.asked_ns[question as usize].take() else { return false };
-        let understood =
-            direction == Direction::Refusal || self.understand(now, sent_ns, question, frame).is_ok();
+        if !self.asked.answered(now, question) {
+            return false;
+        }
+        let understood = direction == Direction::Refusal
+            || self.understand(now, question, frame).is_ok_and(|believed| believed);
         if understood && question.once() {
             self.settled[question as usize] = true;
         }
         understood
     }
 
-    fn understand(
-        &mut self,
-        now: u64,
-        sent_ns: u64,
-        question: Question,
-        frame: &Frame<'_>,
-    ) -> Result<(), msp::TooShort> {
+    /// Takes what an answer says; false when it cannot be true.
+    fn understand(&mut self, now: u64, question: Question, frame: &Frame<'_>) -> Result<bool, msp::TooShort> {
         let payload = frame.payload;
         match question {
             Question::Status => {
@@ -282,7 +286,8 @@ impl Link {
                 } else {
                     (parse_reply(&Attitude, payload)?, None, ON_THE_WAY_NS)
                 };
-                let sampled_ns = now.saturating_sub(way_ns).max(sent_ns);
+                let read_ns = now.saturating_sub(way_ns + self.asked.held_up_ns());
+                let Some(sampled_ns) = self.attitudes.date(now, read_ns, reply) else { return Ok(false) };
                 self.said.attitude = Some(AttitudeSample { sampled_ns, reply, imu });
             }
             Question::Api => {
@@ -304,7 +309,7 @@ impl Link {
             Question::Analog => self.said.analog = Some(parse_reply(&Analog, payload)?),
             Question::Motor => self.said.motors_us = parse_reply(&Motor, payload)?.motors_us,
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Writes a frame of channels (roll, pitch, throttle, yaw, AUX1...) and returns its length.
@@ -322,6 +327,7 @@ impl Link {
         let (arranged, count) = order.arrange(channels_us, count.min(18));
         let request = SetRawRc::new(arranged.get(..count).unwrap_or(&[])).map_err(FrameError::Channels)?;
         let length = encode_request(out, self.framing.version(), &request).map_err(FrameError::Encode)?;
+        let length = fill(out, length);
         self.schedule.spend(now);
         self.frame_ns = Some(now);
         self.command_ns = Some(now);
@@ -342,17 +348,11 @@ impl Link {
         orphan: bool,
         out: &mut [u8; MAX_FRAME],
     ) -> Option<usize> {
-        for (index, slot) in self.asked_ns.iter_mut().enumerate() {
-            if slot.is_some_and(|sent| now.saturating_sub(sent) >= LOST_NS) {
-                *slot = None;
-                self.imu_lost += u8::from(index == Question::Attitude as usize && !self.imu_answered);
-                self.imu &= self.imu_lost < MOST_UNANSWERED;
-                self.imu_lost = self.imu_lost.min(MOST_UNANSWERED);
-            }
-        }
+        self.asked.expire(now);
         if self.framing.turn(now, self.silent(now)) {
             // Whatever is on its way was not understood.
-            self.asked_ns = [None; 10];
+            self.asked.forget();
+            self.together.forget();
             self.schedule.hurry(Question::Status, now);
             self.schedule.hurry(Question::Map, now);
         }
@@ -365,7 +365,7 @@ impl Link {
             since(self.command_ns) >= SPACING_NS
                 && (!self.asked_since_frame || since(self.frame_ns) > 40_000_000)
         };
-        if !spaced || self.asked_ns.iter().flatten().count() >= MOST_OUTSTANDING {
+        if !spaced {
             return None;
         }
         if eager || orphan {
@@ -375,31 +375,27 @@ impl Link {
             );
         }
         let silent = self.silent(now);
-        let (asked, settled) = (&self.asked_ns, &self.settled);
+        let (asked, settled) = (&self.asked, &self.settled);
         let question = self.schedule.next(now, |question| {
             let index = question as usize;
             let wanted = if question.once() { !settled[index] } else { true };
-            wanted && asked[index].is_none() && (!silent || question == Question::Status)
+            wanted && asked.free(question) && (!silent || question == Question::Status)
         })?;
         // One that comes again and is not urgent: no harm where it is not understood.
         let probe = question == Question::Analog && self.identified() && self.framing.probe(now);
         let version = if probe { Version::V2 } else { self.framing.version() };
-        let length = write(question, version, self.imu, out).ok()?;
+        let imu = self.together.wanted(now) && !self.attitudes.overdue(now);
+        let length = write(question, version, imu, out).ok()?;
+        let length = fill(out, length);
         self.framing.asked();
         self.schedule.asked(question, now, eager);
         self.schedule.spend(now);
-        self.asked_ns[question as usize] = Some(now);
+        self.asked.sent(now, question);
+        if question == Question::Attitude {
+            self.together.asked(now);
+        }
         self.command_ns = Some(now);
         self.asked_since_frame = true;
         Some(length)
     }
-}
-
-/// Why a frame of channels was not written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrameError {
-    /// A channel out of range, or none.
-    Channels(msp::messages::Refusal),
-    /// It does not fit.
-    Encode(EncodeError),
 }

@@ -207,6 +207,8 @@ impl Scenario {
             let at_s = order.at_s.context("orders after the first need at_s, seconds after the take-off")?;
             ensure!((0.0..=LONGEST_S).contains(&at_s), "at_s is {at_s}; allowed: 0..={LONGEST_S}");
         }
+        let times = self.orders.iter().map(|order| order.at_s.unwrap_or(0.0));
+        ensure!(times.is_sorted(), "orders do not stand in the order of their times");
         for order in &self.orders {
             ensure!(
                 (order.order == Order::Goto) == order.to.is_some(),

@@ -11,6 +11,7 @@ const ON_PAD_M: f32 = 0.35;
 #[must_use]
 pub fn failures(scenario: &Scenario, seen: &Seen) -> Vec<String> {
     let mut told = Told::default();
+    beginnings(scenario, seen, &mut told);
     ending(scenario, seen, &mut told);
     failsafes(scenario, seen, &mut told);
     quality(scenario, seen, &mut told);
@@ -31,6 +32,18 @@ impl Told {
 
 fn or_never(time_s: Option<f64>) -> String {
     time_s.map_or_else(|| "never".to_owned(), |time| format!("{time:.1} s"))
+}
+
+/// A flight that is over before something breaks proves nothing about what comes of it.
+fn beginnings(scenario: &Scenario, seen: &Seen, told: &mut Told) {
+    for (index, fault) in scenario.faults.iter().enumerate() {
+        let Some(from_s) = fault.from_s else { continue };
+        told.unless(seen.begun.get(index) == Some(&true), || {
+            let number = index + 1;
+            let over = or_never(seen.ended_s);
+            format!("the flight was over before fault {number} began at {from_s} s (down after {over})")
+        });
+    }
 }
 
 /// Where and how it ended.

@@ -70,6 +70,8 @@ pub struct Seen {
     pub height_m: f32,
     /// How often the motors were armed.
     pub armings: u32,
+    /// For each fault: it was there from the start, or began in the air.
+    pub begun: Vec<bool>,
     #[serde(skip)]
     trail: Trail,
 }
@@ -113,6 +115,7 @@ impl Seen {
             self.ended_s = None;
         }
         self.touch(&truth, airborne, at_s);
+        self.begin(scenario, at_s);
         if self.took_off_s.is_some() && at_s >= scenario.trouble_s() {
             self.stop(&truth, at_s);
         }
@@ -128,6 +131,15 @@ impl Seen {
             }
         }
         self.hear(flight, at_s);
+    }
+
+    /// A fault that begins on the ground after the flight finds nothing to break. Whether the motors run is not asked:
+    /// stopping them may be what the fault does.
+    fn begin(&mut self, scenario: &Scenario, at_s: f64) {
+        self.begun.resize(scenario.faults.len(), false);
+        for (begun, fault) in self.begun.iter_mut().zip(&scenario.faults) {
+            *begun |= fault.from_s.is_none_or(|from_s| self.trail.airborne && at_s >= from_s);
+        }
     }
 
     /// How fast the ground comes.

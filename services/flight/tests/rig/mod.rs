@@ -70,6 +70,9 @@ impl Pilot {
     }
 }
 
+/// What a bad line makes of bytes; true: on their way to the controller.
+pub(crate) type Spoil = Box<dyn FnMut(bool, Vec<u8>) -> Vec<u8>>;
+
 pub(crate) struct Rig {
     pub(crate) firmware: Firmware,
     config: Config,
@@ -83,6 +86,7 @@ pub(crate) struct Rig {
     pub(crate) reader: msp::Decoder<1024>,
     pub(crate) attitudes: Vec<Attitude>,
     pub(crate) powers: usize,
+    pub(crate) spoil: Option<Spoil>,
 }
 
 impl Rig {
@@ -127,6 +131,7 @@ impl Rig {
             reader: msp::Decoder::new(),
             attitudes: Vec::new(),
             powers: 0,
+            spoil: None,
         }
     }
 
@@ -151,14 +156,16 @@ impl Rig {
             }
             let mut bytes = [0; 1024];
             let count = self.flight.controller_read(&mut bytes);
+            let bytes = self.spoil(false, bytes[..count].to_vec());
             if self.connected {
-                self.core.receive(now, &bytes[..count]);
+                self.core.receive(now, &bytes);
             }
             self.core.step(now);
             if self.connected {
                 let out = self.core.waiting().to_vec();
                 self.core.taken(out.len());
-                self.flight.controller_write(&out);
+                let arriving = self.spoil(true, out.clone());
+                self.flight.controller_write(&arriving);
                 let commands = &mut self.commands;
                 self.reader.feed(&out, |frame| commands.push((now, frame.code)));
             }
@@ -166,6 +173,13 @@ impl Rig {
             self.flight.ask_to_arm(state.reason.as_str().starts_with(ARM_WITH_THE_RADIO));
             self.attitudes.extend(self.core.take_attitude());
             self.powers += usize::from(self.core.take_power().is_some());
+        }
+    }
+
+    fn spoil(&mut self, to: bool, bytes: Vec<u8>) -> Vec<u8> {
+        match &mut self.spoil {
+            Some(spoil) => spoil(to, bytes),
+            None => bytes,
         }
     }
 

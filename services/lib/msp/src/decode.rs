@@ -73,6 +73,10 @@ pub struct Refused {
 ///
 /// A frame that fails is not thrown away whole: its bytes after the `$` are looked through again, because a
 /// lost byte makes a frame swallow the head of the next one.
+///
+/// A frame gives way to a whole one inside it when much of it would still have to come: a damaged length announces up to a
+/// whole buffer, and would hold everything back until that has come, to hand it out as if it were new. (So a long
+/// payload in which a whole frame stands cannot be carried; no message of MSP has one.)
 #[derive(Clone, Debug)]
 pub struct Decoder<const N: usize> {
     buffer: [u8; N],
@@ -98,9 +102,12 @@ struct Found {
     end: usize,
 }
 
+/// What comes with so few bytes more is waited for: two or three answers of a flight controller.
+const SOON: usize = 32;
+
 enum Head {
-    /// May become a frame with more bytes.
-    Incomplete,
+    /// May become a frame with more bytes; where it would end, once that is known.
+    Incomplete(Option<usize>),
     /// The first so many bytes are no frame.
     Junk(usize),
     /// Announces more than the buffer holds.
@@ -138,8 +145,11 @@ impl<const N: usize> Decoder<N> {
         self.drop_front(self.spent);
         self.spent = 0;
         loop {
-            match self.head() {
-                Head::Incomplete => return None,
+            match head::<N>(self.buffer.get(..self.filled).unwrap_or(&[])) {
+                Head::Incomplete(end) => {
+                    let inside = self.inside(end?)?;
+                    self.give_way(inside);
+                }
                 Head::Junk(count) => self.discard(count),
                 Head::Oversize => {
                     self.refused.oversize = self.refused.oversize.wrapping_add(1);
@@ -150,6 +160,11 @@ impl<const N: usize> Decoder<N> {
                     self.discard(1);
                 }
                 Head::Complete(found) => {
+                    // The same however late the bytes are looked at.
+                    if let Some(inside) = self.inside(found.end) {
+                        self.give_way(inside);
+                        continue;
+                    }
                     self.spent = found.end;
                     return Some(Frame {
                         version: found.version,
@@ -216,54 +231,70 @@ impl<const N: usize> Decoder<N> {
         }
     }
 
-    fn head(&self) -> Head {
-        let bytes = &self.buffer[..self.filled];
-        let Some(&first) = bytes.first() else { return Head::Incomplete };
-        if first != b'$' {
-            return Head::Junk(bytes.iter().position(|byte| *byte == b'$').unwrap_or(bytes.len()));
-        }
-        let version = match bytes.get(1) {
-            None => return Head::Incomplete,
-            Some(b'M') => Version::V1,
-            Some(b'X') => Version::V2,
-            Some(_) => return Head::Junk(1),
-        };
-        let direction = match bytes.get(2) {
-            None => return Head::Incomplete,
-            Some(&character) => match Direction::from_character(character) {
-                Some(direction) => direction,
-                None => return Head::Junk(1),
-            },
-        };
-        let (code, flags, payload, length) = match (version, bytes) {
-            (Version::V1, [_, _, _, 255, code, low, high, ..]) => {
-                (u16::from(*code), 0, 7, usize::from(u16::from_le_bytes([*low, *high])))
-            }
-            (Version::V1, [_, _, _, length, code, ..]) if *length != 255 => {
-                (u16::from(*code), 0, 5, usize::from(*length))
-            }
-            (Version::V2, [_, _, _, flags, code0, code1, length0, length1, ..]) => (
-                u16::from_le_bytes([*code0, *code1]),
-                *flags,
-                8,
-                usize::from(u16::from_le_bytes([*length0, *length1])),
-            ),
-            _ => return Head::Incomplete,
-        };
-        let end = payload + length + 1;
-        if end > N {
-            return Head::Oversize;
-        }
-        let (Some(checked), Some(check)) = (bytes.get(3..end - 1), bytes.get(end - 1)) else {
-            return Head::Incomplete;
-        };
-        let sum = match version {
-            Version::V1 => xor(checked),
-            Version::V2 => crc8_dvb_s2(checked),
-        };
-        if sum != *check {
-            return Head::Broken;
-        }
-        Head::Complete(Found { version, direction, code, flags, payload, end })
+    /// Where a whole frame stands in the one at the front, which would go on to `end` for a while.
+    fn inside(&self, end: usize) -> Option<usize> {
+        let last = end.checked_sub(SOON)?.min(self.filled);
+        let bytes = self.buffer.get(..last)?;
+        (1..last).find(|from| {
+            let rest = bytes.get(*from..).unwrap_or(&[]);
+            rest.first() == Some(&b'$') && matches!(head::<N>(rest), Head::Complete(_))
+        })
     }
+
+    /// The first bytes are a frame that will not be: another one stands in it, at `inside`.
+    fn give_way(&mut self, inside: usize) {
+        self.refused.checksum = self.refused.checksum.wrapping_add(1);
+        self.discard(inside);
+    }
+}
+
+/// What stands at the front of `bytes`, for a buffer of `N`.
+fn head<const N: usize>(bytes: &[u8]) -> Head {
+    let Some(&first) = bytes.first() else { return Head::Incomplete(None) };
+    if first != b'$' {
+        return Head::Junk(bytes.iter().position(|byte| *byte == b'$').unwrap_or(bytes.len()));
+    }
+    let version = match bytes.get(1) {
+        None => return Head::Incomplete(None),
+        Some(b'M') => Version::V1,
+        Some(b'X') => Version::V2,
+        Some(_) => return Head::Junk(1),
+    };
+    let direction = match bytes.get(2) {
+        None => return Head::Incomplete(None),
+        Some(&character) => match Direction::from_character(character) {
+            Some(direction) => direction,
+            None => return Head::Junk(1),
+        },
+    };
+    let (code, flags, payload, length) = match (version, bytes) {
+        (Version::V1, [_, _, _, 255, code, low, high, ..]) => {
+            (u16::from(*code), 0, 7, usize::from(u16::from_le_bytes([*low, *high])))
+        }
+        (Version::V1, [_, _, _, length, code, ..]) if *length != 255 => {
+            (u16::from(*code), 0, 5, usize::from(*length))
+        }
+        (Version::V2, [_, _, _, flags, code0, code1, length0, length1, ..]) => (
+            u16::from_le_bytes([*code0, *code1]),
+            *flags,
+            8,
+            usize::from(u16::from_le_bytes([*length0, *length1])),
+        ),
+        _ => return Head::Incomplete(None),
+    };
+    let end = payload + length + 1;
+    if end > N {
+        return Head::Oversize;
+    }
+    let (Some(checked), Some(check)) = (bytes.get(3..end - 1), bytes.get(end - 1)) else {
+        return Head::Incomplete(Some(end));
+    };
+    let sum = match version {
+        Version::V1 => xor(checked),
+        Version::V2 => crc8_dvb_s2(checked),
+    };
+    if sum != *check {
+        return Head::Broken;
+    }
+    Head::Complete(Found { version, direction, code, flags, payload, end })
 }

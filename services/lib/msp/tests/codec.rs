@@ -161,13 +161,41 @@ fn frames_swallowed_by_a_false_head_come_out_together() {
 }
 
 #[test]
+fn a_short_payload_may_be_a_frame() {
+    // What a flow sensor sees may be anything.
+    let frame = (Version::V2, Direction::Request, 0x1f02, b"$X<\x00\x64\x00\x00\x00\x8f".to_vec());
+    assert_eq!(decode(&bytes_of(&frame)), [frame]);
+}
+
+#[test]
+fn a_damaged_length_hides_nothing_that_follows() {
+    // A head that claims 128 bytes (one bit of a length of 0), then whole frames: each comes out with its last byte.
+    let mut decoder = Decoder::<512>::new();
+    decoder.feed(b"$M>\x80\x6c\x6c", |_| panic!("no frame here"));
+    for _ in 0..4 {
+        decoder.feed(b"$M>\x00\x6c", |_| panic!("not complete yet"));
+        assert_eq!(decoder.push(b'\x6c').map(|frame| frame.code), Some(108));
+    }
+    assert_eq!(decoder.refused(), msp::Refused { checksum: 1, oversize: 0, bytes: 6 });
+}
+
+#[test]
+fn broken_frames_inside_an_incomplete_one_do_not_hide_a_whole_one() {
+    let mut stream = b"$X>\x00\x6c\x00\x40\x00\x01$M>\x00\x6c\x6d$$X>".to_vec();
+    stream.extend_from_slice(b"$M>\x00\x6c\x6c");
+    assert_eq!(decode(&stream), [(Version::V1, Direction::Reply, 108, vec![])]);
+}
+
+#[test]
 fn an_abandoned_head_frees_what_stands_behind_it() {
     let mut decoder = Decoder::<512>::new();
-    let mut stream = b"$M>\x80\x6c".to_vec();
-    stream.extend_from_slice(b"$M<\x00\x6c\x6c");
-    decoder.feed(&stream, |_| panic!("hidden behind the false head"));
+    // The second is still incomplete when the first is given up.
+    decoder.feed(b"$M>\x80\x6c$M<\x01\x6c", |_| panic!("no frame here"));
     assert!(decoder.in_frame());
     decoder.abandon();
-    assert_eq!(decoder.pending().map(|frame| frame.code), Some(108));
+    assert!(decoder.pending().is_none() && decoder.in_frame());
+    decoder.feed(b"\x07", |_| panic!("no frame here"));
+    assert_eq!(decoder.push(b'\x6a').map(|frame| frame.payload.to_vec()), Some(vec![7]));
+    decoder.abandon();
     assert!(decoder.pending().is_none() && !decoder.in_frame());
 }

@@ -205,13 +205,23 @@ fn attitude_and_accelerometer_in_one() {
     let attitude = AttitudeReply { roll_decidegrees: 12, pitch_decidegrees: -5, yaw_degrees: 90 };
     assert_eq!(reply.attitude, attitude);
     assert_eq!(reply.imu, Some(RawImuReply { accelerometer: [10, -20, 512] }));
-    // A board without an accelerometer answers nothing for it, an answer cut short likewise; without the attitude it
-    // is none.
-    for short in [&both[..7], &both[..8], &both[..12], &hex("06 0c 00 fb ff 5a 00 00")] {
+    // A board without an accelerometer answers nothing for it, and what does not fit is left out whole.
+    for short in [&both[..7], &hex("06 0c 00 fb ff 5a 00 00")] {
         let reply = parse_reply(&AttitudeAndImu, short).unwrap();
         assert_eq!((reply.attitude, reply.imu), (attitude, None), "{short:02x?}");
     }
-    for broken in [&both[..0], &both[..6], &hex("05 0c 00 fb ff 5a")] {
+    for broken in [&both[..0], &both[..6], &both[..8], &both[..12], &hex("05 0c 00 fb ff 5a")] {
         assert!(parse_reply(&AttitudeAndImu, broken).is_err(), "{broken:02x?}");
+    }
+    // A byte of the attitude that was lost or came twice on the way, with the next frame's `$` at the end or without the
+    // last byte: whatever the check byte says of it, this is no attitude.
+    for at in 1..=6 {
+        let (mut lost, mut doubled) = (both.clone(), both.clone());
+        lost.remove(at);
+        lost.push(b'$');
+        doubled.insert(at, both[at]);
+        doubled.pop();
+        assert!(parse_reply(&AttitudeAndImu, &lost).is_err(), "lost {at}");
+        assert!(parse_reply(&AttitudeAndImu, &doubled).is_err(), "doubled {at}");
     }
 }

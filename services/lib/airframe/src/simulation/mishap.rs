@@ -33,6 +33,8 @@ impl Simulation {
         if !faults.is_empty() {
             self.faults = Some(Box::new(Faults::new(faults, vehicle, &self.world, seed)?));
             self.power.fresh = Some(Box::new(self.controller.clone()));
+            // What is broken from the start is broken before the first step.
+            self.suffer();
         }
         Ok(self)
     }

@@ -71,13 +71,25 @@ impl Request for AttitudeAndImu {
         payload.u8(RawImu::CODE as u8);
     }
 }
+/// Three words each of accelerometer, gyroscope and compass, in every firmware.
+const RAW_IMU: usize = 18;
+/// The accelerometer may be missing, but not be half there: a byte that is lost or comes twice shifts the second length,
+/// and one such frame in 256 passes the check byte.
 impl Layout<'_> for AttitudeAndImuReply {
     fn read(reader: &mut Reader<'_>) -> Result<Self, TooShort> {
         let length = reader.u8()?.into();
         let attitude = AttitudeReply::read(&mut Reader::new(reader.bytes(length)?))?;
-        let imu = reader.u8().and_then(|length| reader.bytes(length.into()));
-        let imu = imu.and_then(|bytes| RawImuReply::read(&mut Reader::new(bytes)));
-        Ok(Self { attitude, imu: imu.ok() })
+        if reader.left() == 0 {
+            return Ok(Self { attitude, imu: None });
+        }
+        let length = usize::from(reader.u8()?);
+        let absent = length == 0 && reader.left() == 0;
+        if length < RAW_IMU && !absent {
+            return Err(TooShort { length, needed: RAW_IMU });
+        }
+        let imu = reader.bytes(length)?;
+        let imu = if imu.is_empty() { None } else { Some(RawImuReply::read(&mut Reader::new(imu))?) };
+        Ok(Self { attitude, imu })
     }
 }
 

@@ -1,6 +1,6 @@
 use super::line::Way;
 use super::*;
-use crate::simulation::{Options, STEP_NS, Simulation};
+use crate::simulation::{Options, Simulation};
 use crate::world::{AsBuilt, ClutterLevel, World, WorldFile};
 use floorplan::{Plan, Sidecar};
 use rand::SeedableRng;
@@ -138,8 +138,6 @@ fn standing(faults: &[Fault]) -> Result<Simulation, FaultError> {
 
 /// Ranges of one sensor over forty pings, metres; `None` where it did not answer.
 fn ranges(sim: &mut Simulation, sensor: u8) -> Vec<Option<f32>> {
-    // Faults act from the first step on.
-    sim.advance_to(STEP_NS);
     (0..40)
         .map(|number| {
             sim.ping(1 << sensor, number);
