@@ -1,7 +1,7 @@
 //! The shield over the vehicles as they are flown: their sonars, groups and settings.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use control::{Echo, Footing, Look, Shield, Vector, wrap_angle};
+use control::{Echo, Footing, Look, Shield, Vector, Wish, wrap_angle};
 use pilot::{Craft, PilotConfig};
 use runtime::{Cache, Start, load_manifest, parse_config};
 
@@ -51,9 +51,9 @@ impl Flown {
 
     /// What is left of a wish at cruise speed in a direction of the body, degrees, and what would be allowed there.
     fn left(&self, now: u64, heading: f32, degrees: f32) -> (Vector, f32) {
-        let footing = Footing { place: None, sigma_m: 0.03, heading };
         let wish = Vector::along(heading + degrees.to_radians()) * CRUISE;
-        let guarded = self.shield.guard(now, wish, wish, &footing, None, true);
+        let footing = Footing { place: None, sigma_m: 0.03, heading, velocity: wish, clearance_m: 1.0 };
+        let guarded = self.shield.guard(now, Wish::to(wish), &footing, None);
         (guarded.velocity, guarded.allowed_m_s)
     }
 
