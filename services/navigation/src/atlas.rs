@@ -19,13 +19,15 @@ pub struct Atlas {
 }
 
 impl Atlas {
-    /// Works out distances and costs for a vehicle of this radius.
+    /// Works out distances and costs for a vehicle of this radius. No-fly zones are not free.
     #[must_use]
     pub fn new(plan: Arc<Plan>, rooms: Rooms, sidecar: &Sidecar, radius_m: f32) -> Self {
+        let open = plan.without(&sidecar.no_fly);
+        let open = open.as_ref().unwrap_or(&plan);
         let limits = Limits { radius_m: radius_m.max(SHORTEST_M), ..Limits::default() };
         Self {
-            field: DistanceField::of_not_free(&plan, FIELD_M),
-            map: Costmap::new(&plan, &rooms, &sidecar.doors, &limits),
+            field: DistanceField::of_not_free(open, FIELD_M),
+            map: Costmap::new(open, &rooms, &sidecar.doors, &limits),
             pad: sidecar.pad.map(|pad| (pad.x, pad.y)),
             plan,
             rooms,

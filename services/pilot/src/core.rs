@@ -5,8 +5,8 @@ use crate::config::PilotConfig;
 use crate::ground::Below;
 use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, age_s};
 use control::{
-    ClimbController, Delay, Failsafe, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp, Stage,
-    Tilt, TouchDown, Vector, VelocityController, WayHome, wrap_angle,
+    ClimbController, Delay, Failsafe, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp,
+    Stage, Tilt, TouchDown, Vector, VelocityController, WayHome, wrap_angle,
 };
 use floorplan::{DistanceField, Plan};
 use ipc_types::{ChannelSource, Phase, Text};
@@ -110,6 +110,8 @@ pub struct PilotCore {
     pub(crate) config: PilotConfig,
     pub(crate) craft: Craft,
     pub(crate) walls: Option<Arc<DistanceField>>,
+    /// Distance to the no-fly zones, where there are any.
+    pub(crate) zones: Option<Arc<DistanceField>>,
     pub(crate) way_home: Option<WayHome>,
     /// Length of the way home from where the place was known last, metres.
     pub(crate) home_m: Option<f32>,
@@ -159,7 +161,7 @@ pub struct PilotCore {
 }
 
 impl PilotCore {
-    /// On the ground, with motors off. `plan` gives the walls that the shield respects.
+    /// On the ground, with motors off. `plan` gives the walls that the shield respects; [`Self::forbid`] its no-fly zones.
     #[must_use]
     pub fn new(config: PilotConfig, craft: Craft, plan: Option<(&Plan, Arc<DistanceField>)>) -> Self {
         let way_home = plan.as_ref().map(|(plan, walls)| {
@@ -172,6 +174,7 @@ impl PilotCore {
         velocity.max_tilt_deg = velocity.max_tilt_deg.min(craft.max_tilt_rad.to_degrees());
         Self {
             walls: plan.map(|(_, walls)| walls),
+            zones: None,
             way_home,
             home_m: None,
             attitude: AttitudeSeen::default(),
@@ -214,6 +217,16 @@ impl PilotCore {
             config,
             craft,
         }
+    }
+
+    /// Keeps out of no-fly zones: the distance to them.
+    #[must_use]
+    pub fn forbid(mut self, zones: Arc<DistanceField>) -> Self {
+        if let Some(way) = &mut self.way_home {
+            way.close(&zones, self.craft.radius_m);
+        }
+        self.zones = Some(zones);
+        self
     }
 
     /// Heading on the plan: compass with the localization's offset.

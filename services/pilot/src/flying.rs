@@ -4,8 +4,8 @@ use crate::core::{Decided, PilotCore};
 use crate::phases::BLIND_M_S;
 use crate::senses::age_s;
 use control::{
-    Action, Asking, Cause, Flown, Source, Tilt, Vector, VerticalWish, Wish, arbitrate, hold_velocity, stick,
-    wrap_angle, yaw_rate,
+    Action, Asking, Cause, Flown, Source, Surroundings, Tilt, Vector, VerticalWish, Wish, arbitrate,
+    hold_velocity, stick, wrap_angle, yaw_rate,
 };
 use core::f32::consts::TAU;
 use ipc_types::{ChannelSource, Phase, SetpointKind};
@@ -169,9 +169,10 @@ impl PilotCore {
         let clearance = self.height.clearance_m();
         let heading = self.heading();
         let wish = Wish { velocity: wish.velocity.limited(FASTEST * self.craft.cruise_m_s), ..wish };
+        let plan = Surroundings { walls: self.walls.as_deref(), zones: self.zones.as_deref() };
         self.delay.attitude(now, age_s(self.attitude.sampled, now));
         self.shield.set_delay(self.delay.more_s(now));
-        let guarded = self.shield.guard(now, wish, &self.footing(), self.walls.as_deref());
+        let guarded = self.shield.guard(now, wish, &self.footing(), &plan);
         // Who is lost comes down level, but for the drift that the floor itself shows.
         let velocity_known = age_s(self.pose.at, now) < RECKON_S
             && self.pose.velocity_sigma < MOST_VELOCITY_SIGMA

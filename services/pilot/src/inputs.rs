@@ -4,8 +4,8 @@ use crate::core::PilotCore;
 use crate::senses::{SetpointSeen, age_s};
 use control::{Echo, GridView, Look, Tilt, Vector, wrap_angle};
 use ipc_types::{
-    Attitude, FlightState, FlowMotion, GRID_SIDE, Grid, Patrol, PatrolState, Phase, Pose, Power, Setpoint, SonarHealth,
-    SonarRanges, SonarStatus,
+    Attitude, FlightState, FlowMotion, GRID_SIDE, Grid, Patrol, PatrolState, Phase, Pose, Power, Setpoint,
+    SonarHealth, SonarRanges, SonarStatus,
 };
 
 /// Speed of sound at 20 C, m/s, to place an echo in time.

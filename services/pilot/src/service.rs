@@ -41,8 +41,15 @@ impl Service for Pilot {
         let config = config.at_height(start.vehicle.limits.height_m)?;
         let plan = start.plan()?;
         let walls = start.shared("pilot walls", || Ok(DistanceField::new(&plan, WALLS_M)))?;
+        let mut core = PilotCore::new(config, Craft::of(start), Some((&plan, walls)));
+        if let Some(zones) = plan.within(&start.sidecar()?.no_fly) {
+            let (width, resolution, origin) = (plan.width(), plan.resolution(), plan.origin());
+            core = core.forbid(start.shared("pilot no-fly zones", || {
+                Ok(DistanceField::from_blocked(&zones, width, resolution, origin, WALLS_M))
+            })?);
+        }
         Ok(Self {
-            core: PilotCore::new(config, Craft::of(start), Some((&plan, walls))),
+            core,
             setpoint: ports.input()?,
             patrol: ports.input()?,
             grid: ports.input()?,

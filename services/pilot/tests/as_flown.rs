@@ -1,7 +1,7 @@
 //! The shield over the vehicles as they are flown: their sonars, groups and settings.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use control::{Echo, Footing, Look, Shield, Vector, Wish, wrap_angle};
+use control::{Echo, Footing, Look, Shield, Surroundings, Vector, Wish, wrap_angle};
 use pilot::{Craft, PilotConfig};
 use runtime::{Cache, Start, load_manifest, parse_config};
 
@@ -53,7 +53,7 @@ impl Flown {
     fn left(&self, now: u64, heading: f32, degrees: f32) -> (Vector, f32) {
         let wish = Vector::along(heading + degrees.to_radians()) * CRUISE;
         let footing = Footing { place: None, sigma_m: 0.03, heading, velocity: wish, clearance_m: 1.0 };
-        let guarded = self.shield.guard(now, Wish::to(wish), &footing, None);
+        let guarded = self.shield.guard(now, Wish::to(wish), &footing, &Surroundings::default());
         (guarded.velocity, guarded.allowed_m_s)
     }
 

@@ -171,10 +171,7 @@ impl Commander {
     fn wall(&self, place: Vector) -> Option<f32> {
         const STEP_M: f32 = 0.1;
         let at = |dx: f32, dy: f32| self.walls.distance(place.x + dx, place.y + dy);
-        let fall = Vector::new(
-            at(-STEP_M, 0.0) - at(STEP_M, 0.0),
-            at(0.0, -STEP_M) - at(0.0, STEP_M),
-        );
+        let fall = Vector::new(at(-STEP_M, 0.0) - at(STEP_M, 0.0), at(0.0, -STEP_M) - at(0.0, STEP_M));
         (fall.norm() > 1e-3).then(|| fall.angle())
     }
 }

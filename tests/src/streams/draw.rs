@@ -127,6 +127,8 @@ mod tests {
         let streams: Vec<Stream> = (0..60).flat_map(|seed| draw(seed, &sides)).collect();
         let off = |s: &&Stream| s.offset.x_m.hypot(s.offset.y_m);
         assert!(streams.iter().any(|s| s.faults.is_empty()) && streams.iter().any(|s| s.faults.len() == 2));
-        assert!(streams.iter().any(|s| off(&s) > 1.0) && streams.iter().filter(|s| off(s) < 0.15).count() > 300);
+        assert!(
+            streams.iter().any(|s| off(&s) > 1.0) && streams.iter().filter(|s| off(s) < 0.15).count() > 300
+        );
     }
 }

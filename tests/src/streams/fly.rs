@@ -154,7 +154,11 @@ fn setup(settings: &Settings, streams: &[Stream], cache: &Cache) -> Result<Setup
     setup.simulator.faults = streams.iter().flat_map(|stream| stream.faults.clone()).collect();
     // What the stand-ins open, and nothing else.
     let topics = [
-        ("navigation", &["navigation/grid", "navigation/setpoint"][..], &["localization/pose", "sonar/ranges", "pilot/state", "navigation/grid"][..]),
+        (
+            "navigation",
+            &["navigation/grid", "navigation/setpoint"][..],
+            &["localization/pose", "sonar/ranges", "pilot/state", "navigation/grid"][..],
+        ),
         ("localization", &["localization/pose"][..], &["flight/attitude"][..]),
     ];
     for (name, published, read) in topics {

@@ -165,14 +165,12 @@ mod tests {
 
     #[test]
     fn all_kinds_are_drawn_and_each_asks_for_what_it_says() {
-        let around =
-            Around { heading: 0.5, echo: Some(1.0), wall: Some(-1.0), gaps: [0.3; 8] };
+        let around = Around { heading: 0.5, echo: Some(1.0), wall: Some(-1.0), gaps: [0.3; 8] };
         let mut kinds = BTreeSet::new();
         for seed in 0..200 {
             let mut program = Program::draw(seed, 0.5, 1.0);
             kinds.insert(format!("{:?}", program.kind));
-            let wishes: Vec<Wish> =
-                (0..200).map(|k| program.ask(f64::from(k) * 0.05, &around)).collect();
+            let wishes: Vec<Wish> = (0..200).map(|k| program.ask(f64::from(k) * 0.05, &around)).collect();
             let along = |direction: f32| {
                 wishes.iter().all(|w| wrap_angle(w.velocity.angle() - direction).abs() < 1e-3)
             };

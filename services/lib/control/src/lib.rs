@@ -39,7 +39,10 @@ pub use liftoff::{Liftoff, LiftoffConfig, SpoolUp};
 pub use motion::{Motion, MotionConfig};
 pub use planar::{Vector, wrap_angle};
 pub use position::{HoldConfig, hold_velocity};
-pub use shield::{Braking, Delay, GridView, Echo, Footing, Guarded, Look, MAX_SENSORS, Shield, ShieldConfig, Wish};
+pub use shield::{
+    Braking, Delay, Echo, Footing, GridView, Guarded, Look, MAX_SENSORS, Shield, ShieldConfig, Surroundings,
+    Wish,
+};
 pub use touchdown::{TouchDown, TouchDownConfig};
 pub use velocity::{Flown, Tilt, VelocityConfig, VelocityController};
 pub use way_home::WayHome;

@@ -48,6 +48,15 @@ impl WayHome {
         }
     }
 
+    /// Nor does it lead nearer than `clearance_m` to these areas.
+    pub fn close(&mut self, zones: &DistanceField, clearance_m: f32) {
+        for (i, cell) in self.open.iter_mut().enumerate() {
+            let x = self.origin.x + ((i % self.width) as f32 + 0.5) * CELL_M;
+            let y = self.origin.y + ((i / self.width) as f32 + 0.5) * CELL_M;
+            *cell &= zones.distance(x, y) >= clearance_m;
+        }
+    }
+
     fn index(&self, at: Vector) -> Option<usize> {
         let x = ((at.x - self.origin.x) / CELL_M).floor();
         let y = ((at.y - self.origin.y) / CELL_M).floor();

@@ -1,7 +1,7 @@
 //! The shield over a drawn building and over arbitrary readings.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use control::{Echo, Footing, Look, Shield, ShieldConfig, Vector, Wish};
+use control::{Echo, Footing, Look, Shield, ShieldConfig, Surroundings, Vector, Wish};
 use floorplan::{DistanceField, Plan};
 use proptest::prelude::*;
 use std::f32::consts::{FRAC_PI_4, PI};
@@ -24,6 +24,10 @@ fn at(place: Vector) -> Footing {
 /// High above the ground, and nobody knows where.
 fn somewhere() -> Footing {
     Footing { place: None, sigma_m: 9.0, ..at(Vector::ZERO) }
+}
+
+fn among(walls: &DistanceField) -> Surroundings<'_> {
+    Surroundings { walls: Some(walls), zones: None }
 }
 
 fn to(x: f32, y: f32) -> Wish {
@@ -80,7 +84,8 @@ fn through(start: Vector, wish: Vector, seconds: f32) -> (Vector, f32, f32) {
                 assert!(shield.hear(sensor, Look { at_ns: now, heading: 0.0, place: Some(place), echo }));
             }
         }
-        let guarded = shield.guard(now, Wish::to(wish), &Footing { velocity: wish, ..at(place) }, Some(&walls));
+        let guarded =
+            shield.guard(now, Wish::to(wish), &Footing { velocity: wish, ..at(place) }, &among(&walls));
         place += guarded.velocity * 0.02;
         least = least.min(walls.distance(place.x, place.y) - RADIUS);
         if step > 20 && (place.x - origin.x) < 4.0 {
@@ -128,14 +133,14 @@ fn no_sensor_looking_that_way_no_motion_that_way() {
     }
     assert_eq!(shield.silent(now), (1, 8));
     let footing = Footing { clearance_m: 0.0, ..somewhere() };
-    let left = shield.guard(now, to(0.0, 0.5), &footing, None);
+    let left = shield.guard(now, to(0.0, 0.5), &footing, &Surroundings::default());
     assert_eq!(left.allowed_m_s, 0.0);
     // What is left is turned out of the closed sector, 17 degrees on either side of the dead sensor.
     assert!(left.velocity.angle() < 75f32.to_radians() || left.velocity.angle() > 105f32.to_radians());
-    let ahead = shield.guard(now, to(0.5, 0.0), &footing, None);
+    let ahead = shield.guard(now, to(0.5, 0.0), &footing, &Surroundings::default());
     assert!(ahead.velocity.x > 0.45 && !ahead.limited);
     // Two turns later nobody has looked anywhere.
-    let later = shield.guard(now + 500_000_000, to(0.5, 0.0), &footing, None);
+    let later = shield.guard(now + 500_000_000, to(0.5, 0.0), &footing, &Surroundings::default());
     assert_eq!(later.velocity, Vector::ZERO);
     assert_eq!(shield.silent(now + 500_000_000), (8, 8));
 }
@@ -153,11 +158,50 @@ fn the_plan_stops_what_no_echo_shows() {
         for k in 0..8 {
             shield.hear(k, Look { at_ns: now, heading: 0.0, place: None, echo: Echo::Nothing });
         }
-        place +=
-            shield.guard(now, to(0.6, 0.0), &at(place), Some(&walls)).velocity * 0.02;
+        place += shield.guard(now, to(0.6, 0.0), &at(place), &among(&walls)).velocity * 0.02;
     }
     let gap = walls.distance(place.x, place.y);
     assert!(gap > RADIUS, "{gap}");
+}
+
+#[test]
+fn no_wish_leads_into_a_no_fly_zone_and_who_is_in_one_comes_out() {
+    // The right half of a room of 6 m; a wide gap to it, and nothing that a sonar could hear.
+    let zone: Vec<bool> = (0..40 * 60).map(|cell| cell % 60 >= 30).collect();
+    let zones = DistanceField::from_blocked(&zone, 60, 0.1, (0.0, 0.0), 2.0);
+    let plan = Surroundings { walls: None, zones: Some(&zones) };
+    let mut shield = eight();
+    let mut fly = |from: Vector, wish: Wish, seconds: u64| {
+        let mut place = from;
+        let mut velocity = Vector::ZERO;
+        for step in 0..seconds * 50 {
+            let now = step * 20_000_000;
+            for k in 0..8 {
+                shield.hear(k, Look { at_ns: now, heading: 0.0, place: None, echo: Echo::Nothing });
+            }
+            velocity = shield.guard(now, wish, &Footing { velocity, ..at(place) }, &plan).velocity;
+            place += velocity * 0.02;
+        }
+        place
+    };
+    for (direction, wish) in [to(0.6, 0.0), to(0.5, 0.3), to(0.2, -0.1)].into_iter().enumerate() {
+        let end = fly(Vector::new(1.5, 2.0), wish, 20);
+        assert!(end.x < 3.0 - RADIUS && end.x > 2.0, "direction {direction} ends at {end:?}");
+    }
+    // Carried over the border by a gust: back, whatever is wished.
+    let end = fly(Vector::new(2.95, 2.0), to(0.5, 0.0), 10);
+    assert!(end.x < 3.0 - RADIUS, "{end:?}");
+    // Nobody knows where: a zone means nothing.
+    let nowhere = shield_at_rest().guard(0, to(0.4, 0.0), &somewhere(), &plan);
+    assert!(nowhere.velocity.x > 0.35);
+}
+
+fn shield_at_rest() -> Shield {
+    let mut shield = eight();
+    for k in 0..8 {
+        shield.hear(k, Look { at_ns: 0, heading: 0.0, place: None, echo: Echo::Nothing });
+    }
+    shield
 }
 
 #[test]
@@ -168,10 +212,10 @@ fn near_things_push_and_a_person_ahead_stops() {
         shield.hear(k, Look { at_ns: 0, heading: 0.0, place: None, echo });
     }
     let (footing, low) = (somewhere(), Footing { clearance_m: 0.0, ..somewhere() });
-    let still = shield.guard(0, to(0.0, 0.0), &footing, None).velocity;
+    let still = shield.guard(0, to(0.0, 0.0), &footing, &Surroundings::default()).velocity;
     assert!(still.x < -0.01 && still.x >= -0.2 && still.y.abs() < 1e-6, "{still:?}");
-    assert_eq!(shield.guard(0, to(0.0, 0.0), &low, None).velocity, Vector::ZERO);
-    let ahead = shield.guard(0, to(0.5, 0.0), &low, None).velocity;
+    assert_eq!(shield.guard(0, to(0.0, 0.0), &low, &Surroundings::default()).velocity, Vector::ZERO);
+    let ahead = shield.guard(0, to(0.5, 0.0), &low, &Surroundings::default()).velocity;
     assert!(shield.braking().distance(ahead.x) <= 0.15 + MOUNT - RADIUS);
 }
 
@@ -193,11 +237,11 @@ fn a_box_that_stopped_answering_is_still_there() {
         let look = Look { at_ns: now, heading: 0.35, place: Some(Vector::ZERO), echo: Echo::Nothing };
         shield.hear(k, look);
     }
-    let left = shield.guard(now, to(0.5, 0.0), &footing, None);
+    let left = shield.guard(now, to(0.5, 0.0), &footing, &Surroundings::default());
     assert!(shield.braking().distance(left.velocity.x) <= 0.61 - RADIUS, "{:?}", left.velocity);
-    let aside = shield.guard(now, to(0.0, 0.5), &footing, None);
+    let aside = shield.guard(now, to(0.0, 0.5), &footing, &Surroundings::default());
     assert!(aside.velocity.y > 0.45);
-    let later = shield.guard(now + 200 * ms, to(0.5, 0.0), &footing, None);
+    let later = shield.guard(now + 200 * ms, to(0.5, 0.0), &footing, &Surroundings::default());
     assert!(later.velocity.x < 0.45);
 }
 
@@ -222,7 +266,7 @@ proptest! {
         let flown = Vector::new(flown.0, flown.1);
         let footing = Footing { heading, velocity: flown, clearance_m, ..somewhere() };
         let wish = Vector::new(wish.0, wish.1);
-        let v = shield.guard(now, Wish::to(wish), &footing, None).velocity;
+        let v = shield.guard(now, Wish::to(wish), &footing, &Surroundings::default()).velocity;
         let speed = v.norm();
         // Push and brake at their most.
         prop_assert!(speed <= wish.norm() + 0.71);
@@ -257,7 +301,7 @@ proptest! {
             clearance_m: f(6),
         };
         let walls = DistanceField::new(&door(), 2.0);
-        let v = shield.guard(u64::from(bits[1]), Wish::to(wish), &footing, Some(&walls)).velocity;
+        let v = shield.guard(u64::from(bits[1]), Wish::to(wish), &footing, &among(&walls)).velocity;
         prop_assert!(v.is_finite());
     }
 }

@@ -1,5 +1,5 @@
 use crate::surface::Surfaces;
-use crate::{DistanceField, PlanError, PlanHeader, leap, picture};
+use crate::{DistanceField, NamedArea, PlanError, PlanHeader, leap, picture};
 
 /// Most cells a side.
 pub const MAX_SIDE: usize = 8_192;
@@ -102,6 +102,33 @@ impl Plan {
     /// One number for size, place and every cell: equal plans have equal hashes on every machine.
     pub fn hash(&self) -> u64 {
         self.hash
+    }
+
+    /// Which cells lie in one of these areas, row by row, x fastest, the lowest row first; `None` when none does.
+    #[must_use]
+    pub fn within(&self, areas: &[NamedArea]) -> Option<Vec<bool>> {
+        if areas.is_empty() {
+            return None;
+        }
+        let within = |cell: usize| {
+            let (x, y) = self.centre(cell % self.width, cell / self.width);
+            areas.iter().any(|named| named.area.contains(x, y))
+        };
+        let cells: Vec<bool> = (0..self.cells.len()).map(within).collect();
+        cells.contains(&true).then_some(cells)
+    }
+
+    /// The plan for whoever plans a flight: what must not be entered counts as unknown there. `None` when that is the plan
+    /// itself.
+    #[must_use]
+    pub fn without(&self, areas: &[NamedArea]) -> Option<Self> {
+        let within = self.within(areas)?;
+        let close = |(cell, closed): (&Cell, bool)| match cell {
+            Cell::Free if closed => Cell::Unknown,
+            cell => *cell,
+        };
+        let cells = self.cells.iter().zip(within).map(close).collect();
+        Some(Self::from_cells(self.width, self.resolution, self.origin, cells))
     }
 
     /// All cells, row by row, x fastest, the lowest row first.

@@ -5,6 +5,8 @@ use crate::rooms::MAX_ROOMS;
 
 /// Most doors of a sidecar file.
 const MAX_DOORS: usize = 256;
+/// Most areas that must not be entered.
+const MAX_NO_FLY: usize = 64;
 /// Farthest coordinate, metres, as for the origin of a plan.
 const MAX_COORDINATE_M: f32 = 10_000.0;
 
@@ -18,6 +20,8 @@ const MAX_COORDINATE_M: f32 = 10_000.0;
 /// rooms:
 ///   - {name: Office 1, rectangle: [0.0, 4.0, 5.0, 8.0]}
 ///   - {name: Store, polygon: [[5, 4], [9, 4], [9, 8]]}
+/// no_fly:
+///   - {name: Server rack, rectangle: [7.0, 5.0, 8.0, 6.0]}
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -28,6 +32,8 @@ pub struct Sidecar {
     pub doors: Vec<Door>,
     /// Named areas; where they overlap the first one counts.
     pub rooms: Vec<NamedArea>,
+    /// Areas that the vehicle must not enter in flight.
+    pub no_fly: Vec<NamedArea>,
 }
 
 /// Where the vehicle starts and lands.
@@ -155,7 +161,8 @@ impl Sidecar {
             serde_saphyr::from_slice(yaml).map_err(|error| PlanError::syntax(file, &error))?;
         // "Store" and "Store " are one name to whoever reads them.
         let doors = sidecar.doors.iter_mut().map(|door| &mut door.name);
-        for name in sidecar.rooms.iter_mut().map(|room| &mut room.name).chain(doors) {
+        let areas = sidecar.rooms.iter_mut().chain(&mut sidecar.no_fly);
+        for name in areas.map(|area| &mut area.name).chain(doors) {
             *name = name.trim().to_owned();
         }
         sidecar.check(file)?;
@@ -207,28 +214,39 @@ impl Sidecar {
                 ));
             }
         }
-        for (k, room) in self.rooms.iter().enumerate() {
-            let field = format!("rooms: {}", room.name);
-            check_name(file, "rooms.name", &room.name)?;
-            if self.rooms[..k].iter().any(|other| other.name == room.name) {
-                return Err(PlanError::range(file, &field, &"used twice", "one area a name"));
-            }
-            if let Area::Polygon(corners) = &room.area
-                && !(3..=256).contains(&corners.len())
-            {
-                return Err(PlanError::range(
-                    file,
-                    &field,
-                    &format!("{} corners", corners.len()),
-                    "3 to 256",
-                ));
-            }
-            for value in room.area.coordinates() {
-                check_coordinate(file, &field, value)?;
-            }
+        check_areas(file, "rooms", &self.rooms)?;
+        if self.no_fly.len() > MAX_NO_FLY {
+            let said = format!("{} areas", self.no_fly.len());
+            return Err(PlanError::range(file, "no_fly", &said, "at most 64"));
+        }
+        check_areas(file, "no_fly", &self.no_fly)?;
+        let closed = |pad: &Pad| self.no_fly.iter().find(|zone| zone.area.contains(pad.x, pad.y));
+        if let Some(zone) = self.pad.as_ref().and_then(closed) {
+            let said = format!("in the no-fly zone {}", zone.name);
+            return Err(PlanError::range(file, "pad", &said, "outside every no-fly zone"));
         }
         Ok(())
     }
+}
+
+fn check_areas(file: &str, key: &str, areas: &[NamedArea]) -> Result<(), PlanError> {
+    for (k, named) in areas.iter().enumerate() {
+        let field = format!("{key}: {}", named.name);
+        check_name(file, &format!("{key}.name"), &named.name)?;
+        if areas[..k].iter().any(|other| other.name == named.name) {
+            return Err(PlanError::range(file, &field, &"used twice", "one area a name"));
+        }
+        if let Area::Polygon(corners) = &named.area
+            && !(3..=256).contains(&corners.len())
+        {
+            let said = format!("{} corners", corners.len());
+            return Err(PlanError::range(file, &field, &said, "3 to 256"));
+        }
+        for value in named.area.coordinates() {
+            check_coordinate(file, &field, value)?;
+        }
+    }
+    Ok(())
 }
 
 fn check_name(file: &str, field: &str, name: &str) -> Result<(), PlanError> {

@@ -174,3 +174,41 @@ fn the_widest_place_lies_in_the_largest_part_that_can_be_flown_in() {
     let plan = Plan::from_ascii(&rows, 0.1);
     assert!(widest_place(&plan, 0.2).is_some());
 }
+
+#[test]
+fn what_must_not_be_entered_is_closed_to_whoever_plans_and_to_nobody_else() {
+    let plan = Plan::from_ascii(&TWO, 0.2);
+    let no_fly = "no_fly:\n  - {name: Rack, rectangle: [3.0, 1.0, 4.0, 2.0]}\n";
+    let sidecar = Sidecar::parse("a.rooms.yaml", format!("{SIDECAR}{no_fly}").as_bytes()).unwrap();
+    let open = plan.without(&sidecar.no_fly).unwrap();
+    assert_eq!((plan.cell_at(3.5, 1.5), open.cell_at(3.5, 1.5)), (Cell::Free, Cell::Unknown));
+    let changed = plan.cells().iter().zip(open.cells()).filter(|(a, b)| a != b).count();
+    let within = plan.within(&sidecar.no_fly).unwrap();
+    assert!(changed > 0 && changed <= within.iter().filter(|cell| **cell).count());
+    assert!(plan.cells().iter().zip(open.cells()).zip(within).all(|((a, b), within)| a == b || within));
+    // A wall inside stays one.
+    assert_eq!(
+        plan.cells().iter().filter(|c| **c == Cell::Occupied).count(),
+        open.cells().iter().filter(|c| **c == Cell::Occupied).count()
+    );
+    // Nothing to close: no copy.
+    assert!(plan.without(&[]).is_none());
+    let outside = "no_fly:\n  - {name: Garden, rectangle: [70, 70, 80, 80]}\n";
+    let sidecar = Sidecar::parse("a.rooms.yaml", outside.as_bytes()).unwrap();
+    assert!(plan.without(&sidecar.no_fly).is_none());
+}
+
+#[test]
+fn what_is_wrong_with_a_no_fly_zone_is_named() {
+    for (zone, expected) in [
+        ("{name: Rack, rectangle: [0, 0, 2, 2]}", "`pad` is in the no-fly zone Rack"),
+        ("{name: Rack, polygon: [[3, 1]]}", "`no_fly: Rack` is 1 corners"),
+        ("{name: \"\", rectangle: [3, 1, 4, 2]}", "`no_fly.name`"),
+        ("{name: Rack, rectangle: [3, 1, 20000, 2]}", "`no_fly: Rack` is 20000"),
+        ("{name: Rack, circle: 3}", "cannot be read"),
+    ] {
+        let text = format!("{SIDECAR}no_fly:\n  - {zone}\n");
+        let text = Sidecar::parse("a.rooms.yaml", text.as_bytes()).unwrap_err().to_string();
+        assert!(text.starts_with("a.rooms.yaml: ") && text.contains(expected), "{zone}: {text}");
+    }
+}

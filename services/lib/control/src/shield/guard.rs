@@ -2,9 +2,8 @@
 
 use super::heard::Hit;
 use super::sight::Sight;
-use super::{Braking, Footing, Guarded, Shield, Wish};
+use super::{Braking, Footing, Guarded, Shield, Surroundings, Wish};
 use crate::planar::{Vector, wrap_angle};
-use floorplan::DistanceField;
 
 /// Cosine of the angle from which something begins to be straight ahead (40 degrees; all of it at 28).
 const AHEAD_FROM: f32 = 0.766;
@@ -24,17 +23,10 @@ const UNEXPECTED_M_S: f32 = 0.3;
 impl Shield {
     /// Passes a wish (plan frame, m/s): what is left can be stopped before anything that is seen. What flies too fast
     /// towards a near thing is braked harder than by a smaller wish alone, and what is too near is moved away from.
-    pub fn guard(
-        &self,
-        now: u64,
-        wish: Wish,
-        footing: &Footing,
-        walls: Option<&DistanceField>,
-    ) -> Guarded {
+    pub fn guard(&self, now: u64, wish: Wish, footing: &Footing, plan: &Surroundings<'_>) -> Guarded {
         let blind = if wish.back { BLIND_M_S } else { 0.0 };
         let wish = wish.velocity.known().unwrap_or(Vector::ZERO);
-        let footing =
-            &Footing { velocity: footing.velocity.known().unwrap_or(Vector::ZERO), ..*footing };
+        let footing = &Footing { velocity: footing.velocity.known().unwrap_or(Vector::ZERO), ..*footing };
         let braking = self.braking();
         let mut velocity = self.slide(now, wish, footing, &braking);
         let speed = velocity.norm();
@@ -50,16 +42,16 @@ impl Shield {
         }
         let speed = velocity.norm();
         if speed > 1e-4 {
-            let allowed = self.allowed(now, velocity * (1.0 / speed), footing, walls);
+            let allowed = self.allowed(now, velocity * (1.0 / speed), footing, plan);
             velocity = velocity.limited(allowed.min(self.beside(now, footing)).max(blind));
         }
-        let retreat = self.retreat(now, footing, walls);
+        let retreat = self.retreat(now, footing, plan);
         if retreat != Vector::ZERO {
             velocity = self.seen(now, velocity + retreat, footing);
         }
         let wished = wish.norm();
         let allowed_m_s =
-            if wished > 1e-3 { self.allowed(now, wish * (1.0 / wished), footing, walls) } else { 0.0 };
+            if wished > 1e-3 { self.allowed(now, wish * (1.0 / wished), footing, plan) } else { 0.0 };
         Guarded {
             velocity: velocity.known().unwrap_or(Vector::ZERO),
             allowed_m_s,
@@ -70,7 +62,8 @@ impl Shield {
     /// Most speed beside what is near: there is no time to find out where exactly a wall is that is slid along.
     fn beside(&self, now: u64, footing: &Footing) -> f32 {
         let heard = self.hits(now, footing.velocity).map(|hit| hit.centre.norm());
-        let nearest = heard.chain(self.things(now, footing.place).map(Vector::norm)).fold(f32::INFINITY, f32::min);
+        let nearest =
+            heard.chain(self.things(now, footing.place).map(Vector::norm)).fold(f32::INFINITY, f32::min);
         self.config.beside_m_s + self.config.beside_gain_per_s * (nearest - self.radius_m).max(0.0)
     }
 
@@ -96,12 +89,7 @@ impl Shield {
 
     /// Back from what is too near or comes too fast. What was heard a moment ago and what the plan says do not hold it back:
     /// they may be wrong, and this is the way that the drone came.
-    fn retreat(
-        &self,
-        now: u64,
-        footing: &Footing,
-        walls: Option<&DistanceField>,
-    ) -> Vector {
+    fn retreat(&self, now: u64, footing: &Footing, plan: &Surroundings<'_>) -> Vector {
         let c = &self.config;
         let flown = footing.velocity;
         let floor_m = self.floor_m(footing.clearance_m);
@@ -109,11 +97,11 @@ impl Shield {
         let fast = flown.norm();
         if fast > c.creep_m_s {
             let along = flown * (1.0 / fast);
-            let most = self.braking().speed(self.sure_way(along, footing, walls)).max(c.creep_m_s);
+            let most = self.braking().speed(self.sure_way(along, footing, plan)).max(c.creep_m_s);
             brake += along * (fast - most - brake.dot(along)).max(0.0);
         }
         let brake = brake.limited(c.max_brake_m_s);
-        let push = self.push(now, flown, floor_m) + self.plan_push(footing, walls);
+        let push = self.push(now, flown, floor_m) + self.plan_push(footing, plan);
         push.limited(c.max_push_m_s) - brake
     }
 
@@ -146,7 +134,8 @@ impl Shield {
         for hit in self.hits(now, flown) {
             let Some((towards, gap)) = self.side(&hit).filter(|_| hit.range < floor_m) else { continue };
             let believed = flown.dot(towards);
-            let closing = hit.closing.map_or(believed, |closing| closing.clamp(believed, believed + UNEXPECTED_M_S));
+            let closing =
+                hit.closing.map_or(believed, |closing| closing.clamp(believed, believed + UNEXPECTED_M_S));
             let excess = closing - braking.speed(gap - self.config.margin_m) - brake.dot(towards);
             if closing > 0.0 && excess > 0.0 {
                 brake += towards * excess;
@@ -168,18 +157,22 @@ impl Shield {
         push
     }
 
-    /// Away from the nearest wall of the plan, while the pose is sure of it.
-    fn plan_push(&self, footing: &Footing, walls: Option<&DistanceField>) -> Vector {
+    /// Away from the nearest wall and no-fly zone of the plan, while the pose is sure of it.
+    fn plan_push(&self, footing: &Footing, plan: &Surroundings<'_>) -> Vector {
         let c = &self.config;
-        let (Some(walls), Some(place)) = (walls, footing.place) else { return Vector::ZERO };
-        let missing = c.plan_near_m - (walls.distance(place.x, place.y) - self.radius_m - c.plan_margin_m);
-        let (x, y) = walls.gradient(place.x, place.y);
-        let away = Vector::new(x, y);
-        let steep = away.norm();
-        if missing <= 0.0 || footing.sigma_m > PUSHED_M || steep < 0.3 {
-            return Vector::ZERO;
-        }
-        away * (c.push_gain_per_s * missing / steep.max(1.0))
+        let Some(place) = footing.place.filter(|_| footing.sigma_m <= PUSHED_M) else { return Vector::ZERO };
+        let fields = [(plan.walls, c.plan_near_m + c.plan_margin_m), (plan.zones, c.zone_margin_m)];
+        fields.into_iter().fold(Vector::ZERO, |push, (field, room)| {
+            let Some(field) = field else { return push };
+            let missing = room - (field.distance(place.x, place.y) - self.radius_m);
+            let (x, y) = field.gradient(place.x, place.y);
+            let away = Vector::new(x, y);
+            let steep = away.norm();
+            if missing <= 0.0 || steep < 0.3 {
+                return push;
+            }
+            push + away * (c.push_gain_per_s * missing / steep.max(1.0))
+        })
     }
 
     /// Direction of an echo and the gap between it and the disc.

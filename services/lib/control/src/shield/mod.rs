@@ -18,6 +18,7 @@ pub use grid::GridView;
 
 use crate::check::{RangeError, within};
 use crate::planar::Vector;
+use floorplan::DistanceField;
 use heard::Sensor;
 use remembered::Remembered;
 use sight::Glances;
@@ -74,6 +75,8 @@ pub struct ShieldConfig {
     /// Walls of the plan nearer to the disc and its plan margin than this are moved away from while the pose is sure,
     /// metres: sonars hear no wall that they look at askance.
     pub plan_near_m: f32,
+    /// Room kept to no-fly zones beside the disc and the pose's sigma, metres. No echo says that they are not there.
+    pub zone_margin_m: f32,
     /// Most of the disc that an unsure pose may put inside a wall of the plan while the sonars say free, metres.
     pub plan_overlap_m: f32,
 }
@@ -100,6 +103,7 @@ impl Default for ShieldConfig {
             plan_margin_m: 0.03,
             creep_m_s: 0.15,
             plan_near_m: 0.08,
+            zone_margin_m: 0.1,
             plan_overlap_m: 0.08,
         }
     }
@@ -128,6 +132,7 @@ impl ShieldConfig {
         within("shield.plan_margin_m", self.plan_margin_m, 0.0, 0.2)?;
         within("shield.creep_m_s", self.creep_m_s, 0.0, 0.3)?;
         within("shield.plan_near_m", self.plan_near_m, 0.0, 0.2)?;
+        within("shield.zone_margin_m", self.zone_margin_m, 0.0, 0.5)?;
         within("shield.plan_overlap_m", self.plan_overlap_m, 0.0, 0.15)
     }
 }
@@ -167,6 +172,15 @@ pub struct Footing {
     pub velocity: Vector,
     /// Over what is underneath, metres: near it the echoes of the side sonars may be its.
     pub clearance_m: f32,
+}
+
+/// What the plan says of the place.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Surroundings<'a> {
+    /// Distance to its walls.
+    pub walls: Option<&'a DistanceField>,
+    /// Distance to its no-fly zones; `None` without one.
+    pub zones: Option<&'a DistanceField>,
 }
 
 /// What is wished.

@@ -1,7 +1,7 @@
 //! How far the way is free in a direction, and how fast it may be flown.
 
 use super::sight::{Sight, sight};
-use super::{Footing, Shield};
+use super::{Footing, Shield, Surroundings};
 use crate::planar::{Vector, wrap_angle};
 use floorplan::DistanceField;
 
@@ -12,6 +12,10 @@ const ARC: [f32; 7] = [-1.0, -0.667, -0.333, 0.0, 0.333, 0.667, 1.0];
 /// Up to this standard deviation the place is sure of where the disc is, metres: twice what a flight with a flow sensor
 /// says of itself.
 const SURE_M: f32 = 0.08;
+
+/// Most of the place's standard deviation that is added to the room kept to no-fly zones, metres: beyond it the place is
+/// uncertain for the failsafe table (0.5 m).
+const ZONE_SIGMA_M: f32 = 0.5;
 
 impl Shield {
     /// Free way of the disc with its margin in a direction (unit vector, plan frame) by the echoes alone,
@@ -43,7 +47,9 @@ impl Shield {
 
     /// What was heard a moment ago or stands in the grid, from the middle of the drone.
     pub(super) fn things(&self, now: u64, place: Option<Vector>) -> impl Iterator<Item = Vector> + '_ {
-        place.into_iter().flat_map(move |place| self.remembered.things(now).chain(self.grid.points(now)).map(move |thing| thing - place))
+        place.into_iter().flat_map(move |place| {
+            self.remembered.things(now).chain(self.grid.points(now)).map(move |thing| thing - place)
+        })
     }
 
     /// Free way of a disc of `radius` by the plan's walls. Inside the radius sliding along and away is free.
@@ -66,18 +72,36 @@ impl Shield {
     }
 
     /// The same as far as the place is sure, with the room that the plan and the place may err by.
-    pub(super) fn sure_way(&self, direction: Vector, footing: &Footing, walls: Option<&DistanceField>) -> f32 {
-        match (walls, footing.place) {
-            (Some(walls), Some(place)) if footing.sigma_m < SURE_M => {
-                Self::plan_way(walls, place, direction, self.radius_m + self.config.plan_margin_m + footing.sigma_m)
+    pub(super) fn sure_way(&self, direction: Vector, footing: &Footing, plan: &Surroundings<'_>) -> f32 {
+        let Some(place) = footing.place else { return FAR_M };
+        let zone = self.zone_way(place, direction, footing, plan.zones);
+        match plan.walls {
+            Some(walls) if footing.sigma_m < SURE_M => {
+                let radius_m = self.radius_m + self.config.plan_margin_m + footing.sigma_m;
+                zone.min(Self::plan_way(walls, place, direction, radius_m))
             }
-            _ => FAR_M,
+            _ => zone,
         }
+    }
+
+    /// Free way by the no-fly zones; without a known place nobody knows where they are.
+    fn zone_way(
+        &self,
+        place: Vector,
+        direction: Vector,
+        footing: &Footing,
+        zones: Option<&DistanceField>,
+    ) -> f32 {
+        let sigma =
+            if footing.sigma_m.is_finite() { footing.sigma_m.clamp(0.0, ZONE_SIGMA_M) } else { ZONE_SIGMA_M };
+        let radius_m = self.radius_m + self.config.zone_margin_m + sigma;
+        zones.map_or(FAR_M, |zones| Self::plan_way(zones, place, direction, radius_m))
     }
 
     /// How well a direction (body frame) is watched now.
     pub(super) fn sight(&self, now: u64, bearing: f32) -> Sight {
-        let ring = self.sensors.iter().flatten().map(|s| (s.bearing, self.fresh(s, now).is_some() && !s.doubted()));
+        let ring =
+            self.sensors.iter().flatten().map(|s| (s.bearing, self.fresh(s, now).is_some() && !s.doubted()));
         let (cone, look) = (self.config.cone_half_angle_deg, self.config.look_half_angle_deg);
         sight(&ring, bearing, cone.to_radians(), look.to_radians())
     }
@@ -88,7 +112,7 @@ impl Shield {
         now: u64,
         direction: Vector,
         footing: &Footing,
-        walls: Option<&DistanceField>,
+        plan: &Surroundings<'_>,
     ) -> f32 {
         let c = &self.config;
         let seen = self.sight(now, wrap_angle(direction.angle() - footing.heading));
@@ -99,7 +123,9 @@ impl Shield {
         };
         let braking = self.braking();
         let speed = braking.speed(self.free_way(now, direction, footing)).min(most);
-        let (Some(walls), Some(place)) = (walls, footing.place) else { return speed };
+        let Some(place) = footing.place else { return speed };
+        let speed = speed.min(braking.speed(self.zone_way(place, direction, footing, plan.zones)));
+        let Some(walls) = plan.walls else { return speed };
         let sigma = if footing.sigma_m.is_finite() { footing.sigma_m.clamp(0.0, 0.08) } else { 0.08 };
         let soft = Self::plan_way(walls, place, direction, self.radius_m + c.plan_margin_m + sigma);
         let overlap = (sigma - SURE_M).clamp(-c.plan_margin_m, c.plan_overlap_m);
