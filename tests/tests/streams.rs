@@ -21,7 +21,10 @@ fn hostile_commands_and_broken_sonars_seldom_end_in_a_contact() {
     // A shield that lets nothing move would touch nothing.
     let per_stream_m = report.distance_m / report.streams as f64;
     assert!(per_stream_m > 1.2, "{per_stream_m} m a stream");
-    let touched: Vec<String> =
-        report.contacts.iter().map(|t| format!("seed {} stream {:?}: {}", t.seed, t.stream, t.what)).collect();
+    let touched: Vec<String> = report
+        .contacts
+        .iter()
+        .map(|t| format!("seed {} stream {:?}: {}", t.seed, t.stream, t.what))
+        .collect();
     assert!(touched.len() <= 12, "{} contacts: {touched:#?}", touched.len());
 }

@@ -10,7 +10,7 @@ use crate::news::News;
 use crate::plain::Plain;
 use crate::pose::{Walls, fill};
 use crate::seek::{Seek, Why};
-use crate::set::{MEMORY_GROUNDED, MEMORY_SEEKING, Set, columns, fold};
+use crate::set::{MEMORY_GROUNDED, MEMORY_SEEKING, Seeking, Set, columns, fold};
 use crate::start::{From, from};
 use crate::sweep::{Group, Waiting};
 use crate::velocity::Velocity;
@@ -71,6 +71,8 @@ pub struct Localization {
     elsewhere: f32,
     /// A place that was found was not confirmed in time.
     unconfirmed: bool,
+    /// What was being looked for before a restart, until it is looked for again.
+    kept_why: Option<Why>,
     /// Number and time of the last set sent.
     sent: u64,
     sent_ns: u64,
@@ -146,6 +148,7 @@ impl Service for Localization {
             seek,
             elsewhere: 0.0,
             unconfirmed: false,
+            kept_why: None,
             sent: 0,
             sent_ns: 0,
             grounded: true,
@@ -221,10 +224,15 @@ impl Localization {
             return;
         }
         self.grounded = kept.memory[MEMORY_GROUNDED] == 1.0;
-        if kept.memory[MEMORY_SEEKING] == 1.0 {
-            // Hypotheses only: they are searched for anew.
-            self.sent = kept.updates;
-            return;
+        match Seeking::of(kept.memory[MEMORY_SEEKING]) {
+            Seeking::No => {}
+            Seeking::Hypotheses => {
+                // They are searched for anew.
+                self.sent = kept.updates;
+                return;
+            }
+            Seeking::Unchecked => self.kept_why = Some(Why::Check),
+            Seeking::Unconfirmed => (self.kept_why, self.unconfirmed) = (Some(Why::Lost), true),
         }
         // What happened meanwhile is unknown: search with all there is.
         let mut memory = Memory::from_array(&kept.memory);

@@ -7,8 +7,39 @@ use runtime::Guard;
 /// Entry of [`Particles::memory`], after those of [`mcl::Memory`]: 1 while the skids were on the ground.
 pub(crate) const MEMORY_GROUNDED: usize = 15;
 
-/// And the one before: 1 while the set was what competed in a search.
+/// And the one before: how far the place was found, one of [`Seeking`].
 pub(crate) const MEMORY_SEEKING: usize = 14;
+
+/// How far the place was found: what must survive a restart, or a place that nobody has checked would be believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Seeking {
+    /// It is not in question.
+    No,
+    /// The set is what competes in a search.
+    Hypotheses,
+    /// Found, and not checked yet by what was heard after.
+    Unchecked,
+    /// Found, and not confirmed in time.
+    Unconfirmed,
+}
+
+impl Seeking {
+    /// As it stands in the memory.
+    pub(crate) fn code(self) -> f32 {
+        match self {
+            Self::No => 0.0,
+            Self::Hypotheses => 1.0,
+            Self::Unchecked => 2.0,
+            Self::Unconfirmed => 3.0,
+        }
+    }
+
+    /// What stands in a memory; anything else that is there says no.
+    pub(crate) fn of(code: f32) -> Self {
+        let all = [Self::Hypotheses, Self::Unchecked, Self::Unconfirmed];
+        all.into_iter().find(|seeking| seeking.code() == code).unwrap_or(Self::No)
+    }
+}
 
 /// The last set.
 pub(crate) enum Set {

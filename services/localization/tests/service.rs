@@ -8,7 +8,7 @@ use floorplan::{ConeModel, Plan, cast_cone};
 use ipc_types::{
     Attitude, FlowMotion, LocalizationState, PilotState, Pose, SonarRanges, SonarReading, SonarStatus,
 };
-use localization::{FilterKind, Localization, LocalizationConfig};
+use localization::{FilterKind, Localization, LocalizationConfig, StartFrom};
 use runtime::{Cache, Input, Lockstep, Output, StartError};
 use std::f32::consts::{FRAC_PI_4, PI};
 
@@ -296,6 +296,29 @@ fn killed_in_flight_it_is_back_within_two_seconds() {
         assert!(*error < 0.3, "dead for {dead_ms} ms, then {error} m off");
         let after = bench.run(3_000);
         assert!(worst(&after) < 0.3, "dead for {dead_ms} ms: {}", worst(&after));
+    }
+}
+
+/// What was found a moment ago is not believed before it was checked, and a restart does not make it so.
+#[test]
+fn killed_before_the_place_is_checked_it_is_checked_all_the_same() {
+    let mut config = LocalizationConfig::default();
+    config.start.from = StartFrom::Unknown;
+    let mut bench = Bench::with(PAD, config.clone()).unwrap();
+    bench.run(1_000);
+    bench.take_off();
+    let mut seconds = 0;
+    while bench.run(1_000).last().is_none_or(|(pose, _)| pose.searching != 0) {
+        seconds += 1;
+        assert!(seconds < 120, "not found");
+    }
+    bench.system.kill("localization");
+    bench.run(200);
+    bench.system.add_with::<Localization>(config).unwrap();
+    bench.run(1_000);
+    for (pose, error) in bench.run(3_000) {
+        assert!(pose.p_lost > 0.019, "believed without a check: P(lost) {}, {error} m off", pose.p_lost);
+        assert_eq!(pose.searching, 0);
     }
 }
 

@@ -3,6 +3,7 @@
 use super::{BEHIND_S, Believed, Localization};
 use crate::attitude::seconds;
 use crate::seek::{Found, Why};
+use crate::set::Seeking;
 use crate::sweep::Group;
 use crate::velocity::Frames;
 use mcl::{Estimate, Generator, State, TrailPose, wrap_angle};
@@ -165,11 +166,14 @@ impl Localization {
         // The thesis's filter is flown as it is, to be compared.
         if self.grounded || self.plain.is_some() {
             self.seek.stop();
-            (self.elsewhere, self.unconfirmed) = (0.0, false);
+            (self.elsewhere, self.unconfirmed, self.kept_why) = (0.0, false, None);
             return;
         }
         match self.seek.why() {
-            None => self.seek.begin(Why::Audit, 0.0),
+            None => match self.kept_why.take() {
+                Some(why) => self.seek.begin(why, e.heading_offset),
+                None => self.seek.begin(Why::Audit, 0.0),
+            },
             Some(Why::Audit) if e.p_lost >= DOUBT_BEGINS => self.seek.begin(Why::Lost, e.heading_offset),
             Some(Why::Check) if self.seek.is_unconfirmed() => {
                 self.unconfirmed = true;
@@ -206,8 +210,18 @@ impl Localization {
         if self.unconfirmed {
             return UNCONFIRMED_DOUBT;
         }
-        let unsure = self.seek.why() == Some(Why::Check) || self.elsewhere > 0.5;
+        let unsure = self.seeking() == Seeking::Unchecked || self.elsewhere > 0.5;
         if unsure { UNCHECKED_DOUBT } else { 0.0 }
+    }
+
+    /// How far the place was found.
+    pub(super) fn seeking(&self) -> Seeking {
+        match self.seek.why().or(self.kept_why) {
+            Some(Why::Start) => Seeking::Hypotheses,
+            _ if self.unconfirmed => Seeking::Unconfirmed,
+            Some(Why::Check) => Seeking::Unchecked,
+            _ => Seeking::No,
+        }
     }
 }
 

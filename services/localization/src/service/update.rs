@@ -5,7 +5,6 @@ use crate::attitude::{Tilt, seconds};
 use crate::clutter::Ear;
 use crate::plain::Flown;
 use crate::predict::{Dynamics, predict};
-use crate::seek::Why;
 use crate::set::{MEMORY_GROUNDED, MEMORY_SEEKING, columns, columns_mut};
 use crate::start::From;
 use crate::sweep::Group;
@@ -89,7 +88,7 @@ impl Localization {
         loan.generator = generator.state();
         loan.memory = update.memory.to_array();
         loan.memory[MEMORY_GROUNDED] = f32::from(u8::from(self.grounded));
-        loan.memory[MEMORY_SEEKING] = f32::from(u8::from(self.seek.why() == Some(Why::Start)));
+        loan.memory[MEMORY_SEEKING] = self.seeking().code();
         loan.count = update.count as u32;
         loan.plan = self.plan;
         loan.send();
