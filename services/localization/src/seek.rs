@@ -69,6 +69,8 @@ struct Answer {
     /// Since when, and since which length of the way, all searches agree and are fairly sure.
     agreed_ns: u64,
     agreed_m: f32,
+    /// Where that was, in the trail's frame.
+    agreed_at: (f32, f32),
 }
 
 impl Answer {
@@ -250,16 +252,20 @@ impl Seek {
         };
         let share: f32 = self.search.hypotheses().iter().filter(near).map(prior).sum::<f32>() / all.max(1e-6);
         let (origin, way_m) = (self.search.origin(), self.trail.way_m());
-        let mut answer = Answer { best, origin, share, agreed_ns: now, agreed_m: way_m };
+        let mut answer =
+            Answer { best, origin, share, agreed_ns: now, agreed_m: way_m, agreed_at: (here.x, here.y) };
         let (x, y, turn_rad) = answer.carried(here);
         if let Some(before) = self.last.filter(|before| before.share >= FAIRLY_SURE) {
             let (bx, by, turn) = before.carried(here);
             if (bx - x).hypot(by - y) < NEAR_M && wrap_angle(turn - turn_rad).abs() < NEAR_RAD {
                 (answer.agreed_ns, answer.agreed_m) = (before.agreed_ns, before.agreed_m);
+                answer.agreed_at = before.agreed_at;
             }
         }
         self.last = Some(answer);
         let flown = way_m - answer.agreed_m >= AGREED_M;
+        let (from_x, from_y) = answer.agreed_at;
+        let moved = (here.x - from_x).hypot(here.y - from_y) >= AGREED_M;
         let wait_s = if self.why == Some(Why::Lost) { AGREED_LOST_S } else { AGREED_S };
         let waited = seconds(answer.agreed_ns, now) >= wait_s;
         let confirms = suspect.is_some_and(|(sx, sy, _)| (x - sx).hypot(y - sy) < NEAR_M);
@@ -267,7 +273,9 @@ impl Seek {
         let sure = match self.why {
             Some(Why::Check) if confirms => share >= SURE && way_m - answer.agreed_m >= CHECK_M,
             Some(Why::Audit) if confirms => share >= SURE,
-            Some(Why::Check | Why::Audit) => share >= SURE_OF_ANOTHER && flown,
+            // Who turns to and fro among things that no plan shows hears the same things for ever: what is believed is
+            // given up for what was believable from two places.
+            Some(Why::Check | Why::Audit) => share >= SURE_OF_ANOTHER && moved,
             _ => share >= SURE && (flown || waited),
         };
         (sure && best.explained >= EXPLAINED).then_some(Found { x, y, turn_rad, doubt: 1.0 - share })
