@@ -8,6 +8,7 @@ use crate::atlas::Atlas;
 use crate::blockage::Blockage;
 use crate::config::NavigationConfig;
 use crate::explore::Explore;
+use crate::firm::Firm;
 use crate::journey::{Journey, Work};
 use crate::mission::{Event, Goal, Heard, Intent, Mission, Nonsense};
 use crate::place::Place;
@@ -50,6 +51,7 @@ pub struct Core {
     pub(crate) journey: Journey,
     pub(crate) courtesy: Courtesy,
     stand: Option<(f32, f32)>,
+    firm: Firm,
     last_ns: Option<u64>,
     pub(crate) text: Text<128>,
     pub(crate) answer: Text<96>,
@@ -84,6 +86,7 @@ impl Core {
             waited_before_s: 0.0,
             courtesy: Courtesy::default(),
             stand: None,
+            firm: Firm::default(),
             last_ns: None,
             text: Text::new("waiting for a command"),
             answer: Text::default(),
@@ -247,6 +250,7 @@ impl Core {
         }
         if let Some(place) = place.filter(|place| place.tracking && self.mission.airborne()) {
             self.journey.see(&place);
+            self.firm.see(now, &place);
         }
         let hearing = self.senses.fresh(now, self.config.ranges_age_s);
         if let Some(place) = place.filter(|place| place.searching) {

@@ -11,6 +11,7 @@
 //! - [`mission`]: commands, phases of the pilot, the pad
 //! - [`journey`]: planning in slices, what was seen, what is left out and why; survives a restart
 //! - `aside`: stepping aside for people in narrow places
+//! - `firm`: waiting where the velocity is known
 //! - `setbacks`: where the way was blocked before
 //! - [`atlas`]: what is known of the building
 //! - [`core`]: all of it together, without ports
@@ -25,6 +26,7 @@ pub mod config;
 pub mod core;
 pub mod explore;
 pub mod fence;
+mod firm;
 pub mod journey;
 pub mod mission;
 mod obstruct;

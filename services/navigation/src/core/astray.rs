@@ -17,6 +17,7 @@ impl Core {
         self.blockage.reset();
         self.courtesy.forget();
         self.stand = None;
+        self.firm.forget();
         self.mission.replanning(place);
         if self.mission.goal() != Goal::None {
             self.journey.plan();

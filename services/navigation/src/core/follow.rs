@@ -88,7 +88,8 @@ impl Core {
         setpoint.heading_rad = steer.heading;
         let (vx, vy) = steer.velocity;
         if vx.hypot(vy) < STANDING_M_S {
-            let (x, y) = *self.stand.get_or_insert((place.x, place.y));
+            let stand = *self.stand.get_or_insert((place.x, place.y));
+            let (x, y) = self.firm.wait_at(now, place).unwrap_or(stand);
             (setpoint.hold_x_m, setpoint.hold_y_m) = (x, y);
         } else {
             self.stand = None;
