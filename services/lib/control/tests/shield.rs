@@ -1,7 +1,7 @@
 //! The shield over a drawn building and over arbitrary readings.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use control::{Echo, Footing, Look, Shield, ShieldConfig, Surroundings, Vector, Wish};
+use control::{Echo, Footing, GridView, Look, Shield, ShieldConfig, Surroundings, Vector, Wish};
 use floorplan::{DistanceField, Plan};
 use proptest::prelude::*;
 use std::f32::consts::{FRAC_PI_4, PI};
@@ -243,6 +243,90 @@ fn a_box_that_stopped_answering_is_still_there() {
     assert!(aside.velocity.y > 0.45);
     let later = shield.guard(now + 200 * ms, to(0.5, 0.0), &footing, &Surroundings::default());
     assert!(later.velocity.x < 0.45);
+}
+
+/// Nothing stands around, by the sonars.
+fn heard_nothing(now: u64) -> Shield {
+    let mut shield = eight();
+    for k in 0..8 {
+        shield.hear(k, Look { at_ns: now, heading: 0.0, place: None, echo: Echo::Nothing });
+    }
+    shield
+}
+
+#[test]
+fn what_the_grid_holds_stops_and_is_forgotten_with_the_place() {
+    let mut cells = [0u8; 41 * 41];
+    // The drone stands in the middle of cell (20, 20); a pole 0.6 m ahead.
+    cells[20 * 41 + 32] = 5;
+    let grid = GridView { origin: Vector::new(-1.025, -1.025), cell_m: 0.05, side: 41, cells: &cells };
+    let mut shield = heard_nothing(0);
+    let ahead = |shield: &Shield| shield.guard(0, to(0.5, 0.0), &at(Vector::ZERO), &Surroundings::default());
+    assert!(ahead(&shield).velocity.x > 0.45);
+    shield.see(0, Vector::ZERO, &grid);
+    let left = ahead(&shield).velocity.x;
+    assert!(left < 0.35 && shield.braking().distance(left) <= 0.6 - RADIUS, "{left}");
+    // Nobody knows where it is: nor where the pole is.
+    let lost = shield.guard(0, to(0.5, 0.0), &somewhere(), &Surroundings::default());
+    assert!(lost.velocity.x > 0.45);
+    shield.forget();
+    assert!(ahead(&shield).velocity.x > 0.45);
+}
+
+#[test]
+fn what_comes_late_costs_speed() {
+    let mut shield = heard_nothing(0);
+    shield.hear(0, Look { at_ns: 0, heading: 0.0, place: None, echo: Echo::Range(1.0) });
+    let allowed = |shield: &Shield| {
+        shield.guard(0, to(1.0, 0.0), &at(Vector::ZERO), &Surroundings::default()).allowed_m_s
+    };
+    let (before, in_time) = (shield.braking().delay_s, allowed(&shield));
+    shield.set_delay(0.4);
+    assert!((shield.braking().delay_s - before - 0.4).abs() < 1e-6);
+    assert!(allowed(&shield) < 0.85 * in_time && allowed(&shield) > 0.0);
+    // A delay that is no number is the longest.
+    shield.set_delay(f32::NAN);
+    assert!(shield.braking().delay_s > before + 1.9);
+}
+
+#[test]
+fn every_number_of_the_shield_has_bounds_and_who_leaves_them_is_told() {
+    type Set = fn(&mut ShieldConfig, f32);
+    let numbers: [(&str, Set); 24] = [
+        ("margin_m", |c, v| c.margin_m = v),
+        ("standoff_m", |c, v| c.standoff_m = v),
+        ("near_m", |c, v| c.near_m = v),
+        ("push_gain_per_s", |c, v| c.push_gain_per_s = v),
+        ("max_push_m_s", |c, v| c.max_push_m_s = v),
+        ("max_brake_m_s", |c, v| c.max_brake_m_s = v),
+        ("beside_m_s", |c, v| c.beside_m_s = v),
+        ("beside_gain_per_s", |c, v| c.beside_gain_per_s = v),
+        ("look_half_angle_deg", |c, v| c.look_half_angle_deg = v),
+        ("gap_m_s", |c, v| c.gap_m_s = v),
+        ("glance_s", |c, v| c.glance_s = v),
+        ("cone_half_angle_deg", |c, v| c.cone_half_angle_deg = v),
+        ("reaction_s", |c, v| c.reaction_s = v),
+        ("deceleration_m_s2", |c, v| c.deceleration_m_s2 = v),
+        ("stale_turns", |c, v| c.stale_turns = v),
+        ("plan_margin_m", |c, v| c.plan_margin_m = v),
+        ("creep_m_s", |c, v| c.creep_m_s = v),
+        ("plan_near_m", |c, v| c.plan_near_m = v),
+        ("zone_margin_m", |c, v| c.zone_margin_m = v),
+        ("plan_overlap_m", |c, v| c.plan_overlap_m = v),
+        ("margin_m", |c, _| c.margin_m = f32::NAN),
+        ("near_m", |c, _| c.near_m = f32::INFINITY),
+        ("grid_stands", |c, _| c.grid_stands = 0),
+        ("reaction_s", |c, _| c.reaction_s = 0.1),
+    ];
+    for (name, set) in numbers {
+        for wrong in [-1.0, 1e9] {
+            let mut config = ShieldConfig::default();
+            set(&mut config, wrong);
+            let error = config.validate().unwrap_err().to_string();
+            assert!(error.contains(&format!("shield.{name}")), "{name} = {wrong}: {error}");
+        }
+    }
+    assert!(ShieldConfig::default().validate().is_ok());
 }
 
 proptest! {

@@ -39,6 +39,10 @@ pub struct Motors {
     /// Current of each at full thrust, amperes.
     #[serde(default = "default_current")]
     pub max_current_a: f32,
+    /// Factor on the firmware's default PID numbers: what whoever built it has tuned its flight controller to. For the
+    /// simulator; a real controller knows its own.
+    #[serde(default = "default_pid_scale")]
+    pub pid_scale: f32,
 }
 
 fn default_lag() -> f32 {
@@ -52,6 +56,9 @@ fn default_arm() -> f32 {
 }
 fn default_current() -> f32 {
     12.0
+}
+fn default_pid_scale() -> f32 {
+    1.0
 }
 
 /// The battery.
@@ -346,6 +353,7 @@ impl Check<'_> {
         self.within("motors.max_thrust_n", v.motors.max_thrust_n, 0.3, 50.0)?;
         self.within("motors.lag_s", v.motors.lag_s, 0.005, 0.3)?;
         self.within("motors.idle_fraction", v.motors.idle_fraction, 0.0, 0.2)?;
+        self.within("motors.pid_scale", v.motors.pid_scale, 0.3, 4.0)?;
         self.within("motors.arm_m", v.motors.arm_m, 0.03, v.body.radius_m)?;
         self.within("motors.max_current_a", v.motors.max_current_a, 1.0, 60.0)?;
         self.within("battery.cells", v.battery.cells as f32, 1.0, 8.0)?;

@@ -39,6 +39,8 @@ pub(crate) struct Loops {
     integral: [f64; 3],
     airmode: bool,
     idle: f64,
+    /// Factor on the personality's PID numbers.
+    scale: f64,
 }
 
 impl Loops {
@@ -52,12 +54,18 @@ impl Loops {
             integral: [0.0; 3],
             airmode: false,
             idle,
+            scale: 1.0,
         }
+    }
+
+    /// Multiplies the PID numbers.
+    pub(crate) fn tune(&mut self, scale: f64) {
+        self.scale = scale;
     }
 
     /// Disarmed: forget.
     pub(crate) fn rest(&mut self) {
-        *self = Self::new(self.idle);
+        *self = Self { scale: self.scale, ..Self::new(self.idle) };
     }
 
     /// Motor commands 0..=1 for one step of `dt` seconds.
@@ -126,7 +134,7 @@ impl Loops {
         let grounded = throttle <= 0.0 && !self.airmode;
         let mut torque = [0.0; 3];
         for axis in 0..3 {
-            let [p, i, d] = personality.pid[axis];
+            let [p, i, d] = personality.pid[axis].map(|number| number * self.scale);
             let error = wanted[axis] - self.gyro[axis];
             let sum = &mut self.integral[axis];
             *sum = (*sum + I_SCALE * i * error * dt).clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT);

@@ -104,6 +104,13 @@ impl Controller {
         }
     }
 
+    /// The board with its PID numbers multiplied by `scale`, as whoever built the aircraft has tuned it.
+    #[must_use]
+    pub fn tuned(mut self, scale: f64) -> Self {
+        self.loops.tune(scale);
+        self
+    }
+
     /// The board with a radio as its receiver: frames come by [`Self::radio`], and those of MSP are used while the radio's
     /// override switch (AUX3) is up, as the firmware does it.
     #[must_use]

@@ -174,7 +174,8 @@ impl Simulation {
             amps: 0.0,
             drawn_mah: 0.0,
         };
-        let mut controller = Controller::new(options.firmware, options.failsafe, idle, phase_ns);
+        let mut controller = Controller::new(options.firmware, options.failsafe, idle, phase_ns)
+            .tuned(f64::from(vehicle.motors.pid_scale));
         let mut turn_scale = 1.0;
         if !options.magnetometer {
             controller = controller.without_magnetometer();

@@ -41,8 +41,17 @@ impl Bench {
     }
 
     fn with(firmware: Firmware, seed: u64, height: f64, failsafe: FailsafeSettings) -> Self {
-        let vehicle = crate::testing::watchman();
-        let (shape, pack) = Shape::new(&vehicle, &Variation::NONE);
+        Self::on(&crate::testing::watchman(), firmware, seed, height, failsafe)
+    }
+
+    fn on(
+        vehicle: &manifest::Vehicle,
+        firmware: Firmware,
+        seed: u64,
+        height: f64,
+        failsafe: FailsafeSettings,
+    ) -> Self {
+        let (shape, pack) = Shape::new(vehicle, &Variation::NONE);
         Self {
             craft: Quadrotor::new(shape, pack, 0.0, 0.0, 0.0, height),
             controller: Controller::new(
@@ -50,7 +59,8 @@ impl Bench {
                 failsafe,
                 f64::from(vehicle.motors.idle_fraction),
                 seed * 7_300_000,
-            ),
+            )
+            .tuned(f64::from(vehicle.motors.pid_scale)),
             inertial: Inertial::levelled([0.0; 2]),
             compass: Compass::undisturbed(0.0),
             random: Xoshiro256PlusPlus::seed_from_u64(seed),
