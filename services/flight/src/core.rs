@@ -2,6 +2,7 @@
 
 use crate::arming::ArmSwitch;
 use crate::config::{Config, Profile};
+use crate::felt::Felt;
 use crate::frame::MAX_FRAME;
 use crate::ladder::{Decision, Ladder};
 use crate::link::Link;
@@ -46,19 +47,8 @@ pub struct Core {
     first_frame_ns: Option<u64>,
     sent_us: [u16; 18],
     tilt_cos: f32,
+    felt: Felt,
     refused: u64,
-}
-
-/// m/s2.
-const GRAVITY_M_S2: f32 = 9.806_65;
-
-/// MSP_RAW_IMU to m/s2 along body x, y and z. One g reads 512, or 256 on boards with a coarse accelerometer; what is near
-/// neither (a fall, a fault) is not told.
-fn felt(accelerometer: [i16; 3]) -> Option<[f32; 3]> {
-    let [x, y, z] = accelerometer.map(f32::from);
-    let all = (x * x + y * y + z * z).sqrt();
-    let one_g = [512.0, 256.0].into_iter().find(|one_g| (0.75..1.33).contains(&(all / one_g)))?;
-    Some([x, y, z].map(|axis| axis / one_g * GRAVITY_M_S2))
 }
 
 impl Core {
@@ -80,6 +70,7 @@ impl Core {
             first_frame_ns: None,
             sent_us: [0; 18],
             tilt_cos: 1.0,
+            felt: Felt::default(),
             refused: 0,
         }
     }
@@ -88,6 +79,8 @@ impl Core {
     pub fn opened(&mut self, now: u64) {
         self.open = true;
         self.link.reopened(now);
+        // It may be another controller.
+        self.felt = Felt::default();
         self.outbox.clear();
         self.first_frame_ns = None;
     }
@@ -227,7 +220,7 @@ impl Core {
         // Clockwise 0..360 becomes counter-clockwise -180..180.
         let clockwise = f32::from(sample.reply.yaw_degrees).rem_euclid(360.0);
         let yaw = if clockwise > 180.0 { 360.0 - clockwise } else { -clockwise };
-        let force = sample.imu.and_then(|imu| felt(imu.accelerometer)).unwrap_or([f32::NAN; 3]);
+        let force = sample.imu.and_then(|imu| self.felt.take(imu.accelerometer)).unwrap_or([f32::NAN; 3]);
         self.tilt_cos = (roll.to_radians().cos() * pitch.to_radians().cos()).max(0.0);
         Some(Attitude {
             sampled_ns: sample.sampled_ns,

@@ -16,6 +16,7 @@ mod asked;
 mod config;
 mod core;
 mod descent;
+mod felt;
 mod frame;
 mod framing;
 mod ladder;

@@ -3,7 +3,7 @@
 use crate::command::Heard;
 use crate::config::PilotConfig;
 use crate::ground::Below;
-use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, age_s};
+use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, UNSEEN_S, age_s};
 use control::{
     ClimbController, Delay, Failsafe, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp,
     Stage, Tilt, TouchDown, Vector, VelocityController, WayHome, wrap_angle,
@@ -74,6 +74,8 @@ impl Craft {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GroundLevel {
     pub(crate) tilt: Tilt,
+    /// What the accelerometer felt beside gravity, m/s2: what its scale is off by.
+    pub(crate) lifted: f32,
     pub(crate) seen: u32,
 }
 
@@ -147,6 +149,8 @@ pub struct PilotCore {
     pub(crate) operator_land: bool,
     pub(crate) blind_since_ns: Option<u64>,
     pub(crate) aside_s: f32,
+    /// Somebody else flies, or nobody sees the attitude: nothing is learned from what comes of the own channels.
+    pub(crate) frozen: bool,
 
     /// For how long the controller has said that it is disarmed.
     pub(crate) disarmed: Held,
@@ -206,6 +210,7 @@ impl PilotCore {
             operator_land: false,
             blind_since_ns: None,
             aside_s: 0.0,
+            frozen: false,
             disarmed: Held::default(),
             failsafe: Failsafe::default(),
             judged: Judgement::NOTHING,
@@ -236,7 +241,7 @@ impl PilotCore {
 
     /// True tilt as far as it is known: the controller's attitude less its level error. What is old is level.
     pub(crate) fn tilt(&self) -> Tilt {
-        let fresh = self.last_step_ns.is_none_or(|now| age_s(self.attitude.at, now) < 0.3);
+        let fresh = self.last_step_ns.is_none_or(|now| age_s(self.attitude.at, now) < UNSEEN_S);
         if !fresh || self.attitude.at.is_none() {
             return Tilt::default();
         }

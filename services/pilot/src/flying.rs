@@ -1,8 +1,8 @@
 //! One step: from phase and wishes to sticks.
 
 use crate::core::{Decided, PilotCore};
-use crate::phases::BLIND_M_S;
-use crate::senses::age_s;
+use crate::phases::{BLIND_M_S, BLIND_SHORT};
+use crate::senses::{UNSEEN_S, age_s};
 use control::{
     Action, Asking, Cause, Flown, Source, Surroundings, Tilt, Vector, VerticalWish, Wish, arbitrate,
     hold_velocity, stick, wrap_angle, yaw_rate,
@@ -64,15 +64,30 @@ impl PilotCore {
         if self.airborne() {
             let acceleration = tilt.acceleration(self.heading()) + self.velocity.learned() + self.air(now);
             self.motion.predict(now, acceleration.limited(4.0));
-            let vertical = self.climb.expected_acceleration(dt, tilt.magnitude(), self.height.climb_m_s());
+            self.freeze(now);
+            let own = self.climb.expected_acceleration(dt, tilt.magnitude(), self.height.climb_m_s());
+            // Whoever else flies comes down steadily, with a throttle that is not known.
+            let vertical = if self.flight.alone { 0.0 } else { own };
             if let Some(lifted) = self.attitude.lifted.take() {
-                self.height.feel(now, lifted - vertical);
+                self.height.feel(now, lifted - self.ground.lifted - vertical);
             }
             self.height.predict(now, vertical);
         } else {
+            self.frozen = false;
             self.motion.predict(now, Vector::ZERO);
             self.height.set(now, 0.0, 0.0, 0.0);
         }
+    }
+
+    /// What others fly teaches nothing. Who is followed again begins at the throttle that was flown, and what the height
+    /// did meanwhile was none of its thrust's doing.
+    fn freeze(&mut self, now: u64) {
+        let frozen = self.flight.alone || age_s(self.attitude.at, now) > UNSEEN_S;
+        if self.frozen && !frozen {
+            self.height.take_bias(1.0);
+            self.climb.set_throttle(f32::from(self.flight.throttle_us));
+        }
+        self.frozen = frozen;
     }
 
     /// What the air does, as far as the newest pose tells: it dies away.
@@ -178,7 +193,7 @@ impl PilotCore {
             && self.pose.velocity_sigma < MOST_VELOCITY_SIGMA
             && (self.judged.action != Action::Descend || self.pose.velocity_sigma < SURE_VELOCITY);
         let velocity = velocity_known.then(|| self.motion.velocity());
-        let trust = if age_s(self.pose.at, now) > FRESH_POSE_S {
+        let trust = if self.frozen || age_s(self.pose.at, now) > FRESH_POSE_S {
             0.0
         } else {
             SURE_VELOCITY / self.pose.velocity_sigma.max(SURE_VELOCITY)
@@ -198,13 +213,15 @@ impl PilotCore {
         };
         let tilt = self.velocity.step(dt, guarded.velocity, &flown);
         let level = self.level();
-        self.learn_trim(dt, level, heading);
+        if !self.frozen {
+            self.learn_trim(dt, level, heading);
+        }
         let bound = |angle: f32| angle.clamp(-MOST_TRIM_RAD - most, MOST_TRIM_RAD + most);
         let (roll, pitch) = (bound(tilt.roll + level.roll), bound(tilt.pitch + level.pitch));
 
         let throttle_us = self.throttle(now, dt);
         let wanted = *self.hold_heading.get_or_insert(heading);
-        let seen = age_s(self.attitude.at, now) < 0.3;
+        let seen = age_s(self.attitude.at, now) < UNSEEN_S;
         let turn = if seen { yaw_rate(&self.config.heading, wanted, heading) } else { 0.0 };
         Decided {
             arm: true,
@@ -278,7 +295,11 @@ impl PilotCore {
                 (VerticalWish::Height(wish.clamp(now_m - reach, now_m + reach)), true)
             }
         };
-        self.climb.step(dt, wish, &mut self.height, tilt, learn)
+        let throttle_us = self.climb.step(dt, wish, &mut self.height, tilt, learn && !self.frozen);
+        let lands = matches!(self.phase, Phase::Landing | Phase::EmergencyLanding);
+        // What is held back is not reckoned with.
+        let share = if blind && lands && clearance < 0.0 { BLIND_SHORT } else { 1.0 };
+        1000.0 + (throttle_us - 1000.0) * share
     }
 
     /// Whether there is something to fly: not before it is known whether the motors run already.

@@ -15,6 +15,9 @@ const SOUND_M_S: f32 = 343.0;
 /// drone so far between two poses.
 const JUMP_M: f32 = 0.5;
 
+/// What an accelerometer's scale may be off by, m/s2: 3 % by the sensors' data sheets, and as much by its calibration.
+const MOST_SCALE_M_S2: f32 = 0.6;
+
 /// Standard deviation of the place up to which a wall of the plan must be heard, metres.
 const SURE_M: f32 = 0.25;
 
@@ -34,6 +37,10 @@ impl PilotCore {
                 roll: old.roll + share * (new.roll - old.roll),
                 pitch: old.pitch + share * (new.pitch - old.pitch),
             };
+            if let Some(lifted) = self.attitude.lifted.take() {
+                let lifted = lifted.clamp(-MOST_SCALE_M_S2, MOST_SCALE_M_S2);
+                self.ground.lifted += share * (lifted - self.ground.lifted);
+            }
         }
     }
 

@@ -13,9 +13,13 @@ const DISARMED_S: f32 = 1.0;
 const THERE_M: f32 = 0.12;
 /// A climb that takes longer goes on as a hover, seconds.
 const CLIMB_S: f32 = 12.0;
-/// Blind descent: rate, and time beyond the reckoned one after which the skids must stand, seconds.
+/// Blind descent: rate, and time beyond the reckoned one after which the skids must stand, seconds: with
+/// [`BLIND_SHORT`] it is down from 1.3 m by then, and lands at 0.6 m/s.
 pub(crate) const BLIND_M_S: f32 = 0.35;
-const BLIND_MORE_S: f32 = 3.0;
+const BLIND_MORE_S: f32 = 5.0;
+/// Who should stand by the reckoning gets so much less collective than that says: 0.12 m/s2. Where the reckoning was wrong
+/// about the climb there may be a metre left, and motors that stop there are a crash.
+pub(crate) const BLIND_SHORT: f32 = 0.994;
 
 /// A setpoint that holds for less is used no more, nanoseconds: channels made from it would expire before the next ones,
 /// a tick of 20 ms later and as much late again, have reached the controller.
@@ -152,6 +156,10 @@ impl PilotCore {
             let since = *self.blind_since_ns.get_or_insert(now);
             let reckoned = clearance.max(0.0) / BLIND_M_S + BLIND_MORE_S;
             let waited = age_s(Some(since), now);
+            if self.touch.step_blind(&self.config.touch_down, dt, self.height.bias_m_s2(), load) {
+                self.stand(now, "landed blind");
+                return;
+            }
             // The dead-reckoned height falls on below the ground: long enough below, it has been reached.
             if clearance < -BLIND_M_S * BLIND_MORE_S || waited > reckoned + 6.0 {
                 self.stand(now, "landed blind");

@@ -52,7 +52,8 @@ impl PilotCore {
     /// The throttle that holds the drone now: the learned one, less what thrust does more than it should (more
     /// right after a take-off than one that was learned only in part).
     fn holding_us(&self) -> f32 {
-        self.climb.balancing_us(self.height.bias_m_s2())
+        // While others fly, the bias is that of their throttle.
+        self.climb.balancing_us(if self.frozen { 0.0 } else { self.height.bias_m_s2() })
     }
 
     /// Writes the channels of the last step, every field but the header.

@@ -2,7 +2,7 @@
 
 use control::{GRAVITY_M_S2, Tilt, Vector, wrap_angle};
 use ipc_types::{
-    Attitude, FlightState, LinkState, LocalizationState, Pose, Power, Setpoint, SetpointKind, Text,
+    Attitude, FlightState, Ladder, LinkState, LocalizationState, Pose, Power, Setpoint, SetpointKind, Text,
     seconds_between,
 };
 
@@ -23,6 +23,8 @@ pub(crate) struct AttitudeSeen {
     pub(crate) lifted: Option<f32>,
 }
 
+/// An attitude that is older tells nothing of now, seconds: `flight` holds the drone level from then on.
+pub(crate) const UNSEEN_S: f32 = 0.3;
 /// More is a crash, no flight, m/s2.
 const MOST_LIFT_M_S2: f32 = 20.0;
 
@@ -131,6 +133,8 @@ pub(crate) struct FlightSeen {
     pub(crate) link: LinkState,
     pub(crate) blocks: u32,
     pub(crate) throttle_us: u16,
+    /// The pilot's channels do not fly the drone: `flight` does by itself, or the controller's own failsafe.
+    pub(crate) alone: bool,
     pub(crate) reason: Text<128>,
     pub(crate) power_at: Option<u64>,
     pub(crate) cell_volts: f32,
@@ -146,6 +150,7 @@ impl Default for FlightSeen {
             link: LinkState::Closed,
             blocks: 0,
             throttle_us: 0,
+            alone: false,
             reason: Text::default(),
             power_at: None,
             cell_volts: f32::NAN,
@@ -155,6 +160,9 @@ impl Default for FlightSeen {
     }
 }
 
+/// FAILSAFE among the mode bits of `flight/state`.
+const FAILSAFE_MODE: u32 = 1 << 2;
+
 impl FlightSeen {
     pub(crate) fn take_state(&mut self, message: &FlightState) -> bool {
         let Some(link) = LinkState::from_code(message.link) else { return false };
@@ -163,6 +171,9 @@ impl FlightSeen {
         self.link = link;
         self.blocks = message.arming_blocks;
         self.throttle_us = message.channels_us[2];
+        let ladder = Ladder::from_code(message.ladder);
+        self.alone = matches!(ladder, Some(Ladder::Level | Ladder::Descend | Ladder::TouchDown))
+            || message.modes & FAILSAFE_MODE != 0;
         self.reason = message.reason;
         true
     }

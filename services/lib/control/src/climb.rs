@@ -71,6 +71,12 @@ pub enum VerticalWish {
 pub(crate) const IDLE_US: f32 = 1000.0;
 /// Drag along the rotor axis, 1/s: small craft lose about a tenth of their climb rate a second.
 const DRAG_PER_S: f32 = 0.1;
+/// An unexplained acceleration beyond this is thrust that is missing (a cell, a propeller) or back again, m/s2: gusts, a
+/// wrong level, vibration and an accelerometer that reads 3 % off stay below a sixth of the weight together.
+const SUDDEN_M_S2: f32 = 1.5;
+/// Time over which the hover throttle takes over what is beyond, seconds: as the accelerometer's own average. Slower, a
+/// drone that lost 44 % of its thrust is on the floor before the throttle has risen by the third that it needs.
+const SUDDEN_S: f32 = 0.1;
 /// Bounds of a hover throttle that is believed. An aircraft outside would climb like a rocket or hardly fly.
 const HOVER_RANGE_US: [f32; 2] = [1120.0, 1800.0];
 
@@ -148,7 +154,7 @@ impl ClimbController {
         tilt_rad: f32,
         learn: bool,
     ) -> f32 {
-        let c = &self.config;
+        let c = self.config;
         let climb = match wish {
             VerticalWish::Height(height) => c.height_gain_per_s * (height - estimate.height_m()),
             VerticalWish::Rate(rate) => rate,
@@ -162,6 +168,9 @@ impl ClimbController {
         let collective = multiple.clamp(low, c.collective_range[1]);
         let free = (low + 0.02..c.collective_range[1] - 0.02).contains(&multiple);
         self.throttle_us = IDLE_US + (self.hover_us - IDLE_US) * collective;
+        if learn {
+            self.take_over_sudden(dt, estimate);
+        }
         if learn && free {
             let taken = estimate.take_bias(c.learning_per_s * dt);
             // An unexplained lift means that less throttle hovers: d(load) = -2 d(collective) / collective.
@@ -170,6 +179,21 @@ impl ClimbController {
             );
         }
         self.throttle_us
+    }
+
+    /// Thrust that is missing is so at any throttle: the hover throttle takes it over at once. At the ends of the range as
+    /// well, for it is measured and no sum of errors; and beyond them, for the range goes with the hover throttle.
+    fn take_over_sudden(&mut self, dt: f32, estimate: &mut HeightEstimator) {
+        let bias = estimate.bias_m_s2();
+        let beyond = bias - bias.clamp(-SUDDEN_M_S2, SUDDEN_M_S2);
+        if beyond == 0.0 {
+            return;
+        }
+        let taken = estimate.take_bias(beyond / bias * (dt / SUDDEN_S).min(1.0));
+        // What is missing grows with the load that is commanded: d(load) = -2 load d(collective) / collective.
+        let load = square((self.lagged_us - IDLE_US) / (self.hover_us - IDLE_US)).max(0.5);
+        let factor = (1.0 - 0.5 * taken / (GRAVITY_M_S2 * load)).clamp(0.95, 1.05);
+        self.set_hover(IDLE_US + (self.hover_us - IDLE_US) * factor);
     }
 
     /// Commands a throttle from outside (spool-up, touch-down).

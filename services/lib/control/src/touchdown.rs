@@ -1,5 +1,6 @@
 //! Knowing that the skids stand.
 
+use crate::GRAVITY_M_S2;
 use crate::check::{RangeError, within};
 
 /// Settings of the touch-down detector.
@@ -34,15 +35,34 @@ impl TouchDownConfig {
     }
 }
 
+/// Blind, thrust over weight under which what carries is the floor: a hover throttle that is wrong by a quarter, as after a
+/// hurried take-off, looks like a floor down to 0.64.
+const BLIND_LOAD: f32 = 0.6;
+
 /// Watches a descent for its end.
 #[derive(Clone, Debug, Default)]
 pub struct TouchDown {
     standing_s: f32,
     skimming_s: f32,
     first_clearance: f32,
+    felt_s: f32,
 }
 
 impl TouchDown {
+    /// One step of a descent without echoes; true when the skids stand. `unexplained_m_s2`: felt beyond what the thrust
+    /// explains. In the air nothing carries what the thrust lacks; a floor does, and the less thrust the more.
+    pub fn step_blind(
+        &mut self,
+        config: &TouchDownConfig,
+        dt: f32,
+        unexplained_m_s2: f32,
+        load: f32,
+    ) -> bool {
+        let carried = load < BLIND_LOAD && unexplained_m_s2 > 0.5 * GRAVITY_M_S2 * (1.0 - load);
+        self.felt_s = if carried { self.felt_s + dt } else { 0.0 };
+        self.felt_s >= config.standing_s
+    }
+
     /// One step of `dt` seconds of a commanded descent; true when the skids stand.
     ///
     /// `clearance_m` and `climb_m_s` by the estimator, `load` the commanded thrust over the weight. Under
@@ -92,6 +112,18 @@ mod tests {
         }
         // Standing: the throttle winds down and nothing moves, though a soft floor reads 6 cm long.
         assert!((0..20).any(|_| touch.step(&config, 0.02, 0.06, -0.02, 0.7)));
+    }
+
+    #[test]
+    fn without_echoes_what_carries_is_the_floor() {
+        let config = TouchDownConfig::default();
+        let mut touch = TouchDown::default();
+        // Falling with a third of the thrust gone, or in a gust: nothing carries. And what a wrong hover throttle seems to carry.
+        assert!((0..500).all(|_| !touch.step_blind(&config, 0.02, -3.0, 0.55)));
+        assert!((0..500).all(|_| !touch.step_blind(&config, 0.02, 1.5, 0.55)));
+        assert!((0..500).all(|_| !touch.step_blind(&config, 0.02, 3.0, 0.7)));
+        let stood = (0..500).position(|_| touch.step_blind(&config, 0.02, 2.5, 0.55));
+        assert!(stood.is_some_and(|steps| (8..=12).contains(&steps)), "{stood:?}");
     }
 
     #[test]

@@ -27,6 +27,10 @@ struct Plant {
     hover_us: f32,
     /// Exponent of the thrust law: 2 as modelled, 1 for a controller that linearises thrust.
     exponent: f32,
+    /// Share of the thrust that is left: of four cells three make 0.56.
+    thrust: f32,
+    /// What the accelerometer tells behind its low-pass of 10 Hz, less gravity.
+    felt: f32,
     link: VecDeque<f32>,
     surface: f32,
     touched_at: f32,
@@ -40,6 +44,8 @@ impl Plant {
             load: 0.0,
             hover_us,
             exponent: 2.0,
+            thrust: 1.0,
+            felt: 0.0,
             link: VecDeque::from(vec![1000.0; 30]),
             surface: 0.0,
             touched_at: 0.0,
@@ -50,8 +56,10 @@ impl Plant {
         self.link.push_back(throttle_us);
         let us = self.link.pop_front().unwrap();
         let wanted = ((us - 1000.0) / (self.hover_us - 1000.0)).max(0.0).powf(self.exponent);
-        self.load += (wanted - self.load) * 0.001 / 0.06;
-        self.climb += (9.81 * (self.load - 1.0) + push - 0.1 * self.climb) * 0.001;
+        self.load += (wanted * self.thrust - self.load) * 0.001 / 0.06;
+        let lifted = 9.81 * (self.load - 1.0) + push - 0.1 * self.climb;
+        self.felt += (lifted - self.felt) * 0.001 / 0.016;
+        self.climb += lifted * 0.001;
         self.height += self.climb * 0.001;
         if self.height <= self.surface {
             if self.climb < -0.05 {
@@ -78,6 +86,8 @@ struct Flight {
     lie: f32,
     tilt: f32,
     push: f32,
+    /// The controller tells its accelerometer, 30 times a second.
+    feels: bool,
     learn: bool,
     steps: u64,
 }
@@ -96,6 +106,7 @@ impl Flight {
             lie: 0.0,
             tilt: 0.0,
             push: 0.0,
+            feels: false,
             learn: true,
             steps: 0,
         }
@@ -141,6 +152,9 @@ impl Flight {
     fn step(&mut self, wish: VerticalWish) -> Option<HeightEcho> {
         let heard = self.sense().map(|(at, range)| self.estimate.measure(at, range, self.tilt));
         let model = self.climb.expected_acceleration(0.02, self.tilt, self.estimate.climb_m_s());
+        if self.feels && self.steps % 5 < 3 {
+            self.estimate.feel(self.now_ns, self.plant.felt - model);
+        }
         self.estimate.predict(self.now_ns, model);
         let us = self.climb.step(0.02, wish, &mut self.estimate, self.tilt, self.learn);
         self.fly(us);
@@ -182,6 +196,24 @@ fn holds_its_height_under_noise_gusts_and_sag() {
             "{}",
             flight.climb.hover_us()
         );
+    }
+}
+
+#[test]
+fn a_lost_cell_costs_less_than_half_of_the_height_and_so_does_one_that_is_back() {
+    for seed in 0..6 {
+        let mut flight = Flight::hovering(1450.0, 1.2, seed);
+        flight.feels = true;
+        flight.hold(1.2, 3.0);
+        flight.plant.thrust = 0.56;
+        let sunk = flight.hold(1.2, 4.0);
+        assert!(sunk < 0.6, "seed {seed}: sank by {sunk}");
+        let worst = flight.hold(1.2, 2.0);
+        assert!(worst < 0.1, "seed {seed}: {worst}");
+        assert!((flight.climb.hover_us() - 1601.0).abs() < 30.0, "{}", flight.climb.hover_us());
+        flight.plant.thrust = 1.0;
+        let risen = flight.hold(1.2, 4.0);
+        assert!(risen < 0.6, "seed {seed}: rose by {risen}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! Whole flights of the pilot's core around a small aircraft.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
+mod alone;
 mod below;
 mod expiry;
 mod home;

@@ -5,8 +5,8 @@
 use control::{Tilt, Vector, stick};
 use floorplan::{DistanceField, Plan};
 use ipc_types::{
-    COMMAND_LIFE_NS, Channels, Command, LinkState, LocalizationState, Phase, PilotState, Pose, Setpoint,
-    SetpointKind, SonarHealth, SonarRanges, Verb,
+    COMMAND_LIFE_NS, Channels, Command, Ladder, LinkState, LocalizationState, Phase, PilotState, Pose,
+    Setpoint, SetpointKind, SonarHealth, SonarRanges, Verb,
 };
 use pilot::{Craft, PilotConfig, PilotCore};
 use std::collections::VecDeque;
@@ -102,6 +102,15 @@ pub(crate) struct Rig {
     pub(crate) adrift_ns: u64,
     pub(crate) link_state: LinkState,
     pub(crate) blocks: u32,
+    /// How far `flight` flies by itself, as `flight/state` says, and the throttle that the controller flies instead.
+    pub(crate) ladder: Ladder,
+    pub(crate) other_us: Option<f32>,
+    /// Share of the thrust that is left.
+    pub(crate) thrust: f32,
+    /// Whether the controller tells its accelerometer; what that feels along the body, m/s2, and one g by its scale.
+    pub(crate) tells_force: bool,
+    pub(crate) force: f32,
+    pub(crate) one_g: f32,
     pub(crate) cell_volts: f32,
     pub(crate) drawn_mah: f32,
     /// Whether the controller tells of its battery.
@@ -159,6 +168,12 @@ impl Rig {
             adrift_ns: 0,
             link_state: LinkState::Up,
             blocks: 0,
+            ladder: Ladder::Following,
+            other_us: None,
+            thrust: 1.0,
+            tells_force: false,
+            force: 9.81,
+            one_g: 9.81,
             cell_volts: 4.0,
             drawn_mah: 100.0,
             power_told: true,
@@ -258,12 +273,12 @@ impl Rig {
         self.link.push_back([
             stick::angle_of(u(0)) - self.level.roll,
             stick::angle_of(u(1)) - self.level.pitch,
-            if self.armed { u(2) } else { 1000.0 },
+            if self.armed { self.other_us.unwrap_or(u(2)) } else { 1000.0 },
             stick::yaw_rate_of(u(3)),
         ]);
         let [roll, pitch, throttle, turn] = self.link.pop_front().unwrap();
         let wanted = ((throttle - 1000.0) / (self.hover_us - 1000.0)).powi(2);
-        self.load += (wanted - self.load) * 0.001 / 0.05;
+        self.load += (self.thrust * wanted - self.load) * 0.001 / 0.05;
         let grounded = self.height <= self.surface + 1e-4;
         let (w, z) = (12.0, 0.75);
         if grounded && self.load < 1.0 {
@@ -280,6 +295,9 @@ impl Rig {
             self.place += self.velocity * 0.001;
         }
         let lift = 9.81 * (self.load * self.tilt.magnitude().cos() - 1.0);
+        let felt = if grounded { self.one_g } else { self.one_g * self.load };
+        // Behind a low-pass of 10 Hz.
+        self.force += (felt - self.force) * 0.001 / 0.016;
         self.climb += (lift - 0.1 * self.climb) * 0.001;
         self.height += self.climb * 0.001;
         if self.height <= self.surface {

@@ -19,9 +19,9 @@ impl Rig {
                 yaw_rad: control::wrap_angle(self.heading - COMPASS),
                 sampled_ns: now,
                 // A firmware that does not tell: without it everything must fly too.
-                force_x_m_s2: f32::NAN,
-                force_y_m_s2: f32::NAN,
-                force_z_m_s2: f32::NAN,
+                force_x_m_s2: if self.tells_force { 0.0 } else { f32::NAN },
+                force_y_m_s2: if self.tells_force { 0.0 } else { f32::NAN },
+                force_z_m_s2: if self.tells_force { self.force } else { f32::NAN },
                 ..Default::default()
             };
             attitude.header.stamp_ns = now;
@@ -32,6 +32,7 @@ impl Rig {
                 armed: u8::from(self.armed),
                 link: self.link_state.code(),
                 arming_blocks: self.blocks,
+                ladder: self.ladder.code(),
                 ..Default::default()
             };
             if self.blocks != 0 {
