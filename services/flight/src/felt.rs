@@ -57,8 +57,10 @@ mod tests {
     fn a_fall_at_half_a_g_is_no_coarse_accelerometer() {
         for one_g in [512, 256] {
             let mut felt = standing(one_g);
-            for percent in [20, 50, 56, 70, 100, 140, 200] {
-                let [x, y, z] = felt.take([0, 0, one_g * percent / 100]).expect("it is told");
+            for percent in [20u8, 50, 56, 70, 100, 140, 200] {
+                let [x, y, z] = felt
+                    .take([0, 0, (i32::from(one_g) * i32::from(percent) / 100) as i16])
+                    .expect("it is told");
                 let expected = GRAVITY_M_S2 * f32::from(percent) * 0.01;
                 assert!(x == 0.0 && y == 0.0 && (z - expected).abs() < 0.05, "{one_g}: {percent} %: {z}");
             }
