@@ -84,7 +84,8 @@ fn the_accelerometer_comes_with_the_attitude_in_either_unit() {
         let mut controller = Controller::new();
         controller.accelerometer = Some(read);
         let mut world = World::new(controller);
-        world.run(500);
+        // Half a second of readings says which unit it is.
+        world.run(1_500);
         let attitude = world.attitudes.last().unwrap();
         let force = [attitude.force_x_m_s2, attitude.force_y_m_s2, attitude.force_z_m_s2];
         match felt {
