@@ -64,7 +64,9 @@ impl Grid {
 
     /// Points that stand, plan frame.
     pub(super) fn points(&self, now: u64) -> impl Iterator<Item = Vector> + '_ {
-        let fresh = self.seen_ns.is_some_and(|at| seconds(at, now) < FRESH_S);
+        // A time that has not come yet is a broken stamp: it would be fresh for ever.
+        let fresh = |at: u64| seconds(at, now) < FRESH_S && seconds(now, at) < FRESH_S;
+        let fresh = self.seen_ns.is_some_and(fresh);
         self.points.iter().flatten().copied().filter(move |_| fresh)
     }
 }
@@ -90,6 +92,8 @@ mod tests {
         assert!(points.iter().any(|p| (*p - Vector::new(3.45, 4.05)).norm() < 1e-3));
         assert!(points.iter().any(|p| (*p - Vector::new(3.05, 4.35)).norm() < 1e-3));
         assert_eq!(grid.points(600_000_000).count(), 0);
+        grid.see(u64::MAX, Vector::new(3.05, 4.05), &view, 5);
+        assert_eq!(grid.points(700_000_000).count(), 0, "from the end of time");
         grid.see(1, Vector::ZERO, &GridView { cell_m: f32::NAN, ..view }, 5);
         assert_eq!(grid.points(2).count(), 0);
     }
