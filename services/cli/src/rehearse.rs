@@ -220,6 +220,16 @@ fn print(report: &Report) {
         total.min_clearance_m,
         total.real_time_factor
     );
+    let claims = &total.first_claims;
+    println!(
+        "said to know its place in {} of {} flights, {} s after the take-off in the median, {} s at the 95th percentile; \
+         {} of these within 0.5 m",
+        claims.made,
+        total.flights,
+        figure(claims.median_s),
+        figure(claims.p95_s),
+        claims.right
+    );
     let honesty = &total.honesty;
     let hours = honesty.time_s / 3600.0;
     let mut noticed: Vec<f32> = honesty.noticed_s.iter().flatten().map(|s| *s as f32).collect();

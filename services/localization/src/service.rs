@@ -29,6 +29,8 @@ const BEHIND_S: f64 = 0.04;
 /// Half of the cone in which a wall's nearest point is looked for, radians, and the rays over it, two degrees apart.
 const WIDE_RAD: f32 = 20.0 * core::f32::consts::PI / 180.0;
 const WIDE_RAYS: usize = 21;
+/// Doubt that was told fades in this time, seconds: two clusters that are alike take turns in being the larger one.
+const FADES_S: f32 = 1.0;
 /// After so long, nanoseconds, a set that was sent and did not come back is given up and the last one that
 /// did is used again.
 const ECHO_TIMEOUT_NS: u64 = 100_000_000;
@@ -81,6 +83,9 @@ pub struct Localization {
     rest_level: [f32; 2],
     believed: Option<Believed>,
     next_pose_ns: u64,
+    /// P(lost) of the last pose, and when that was.
+    doubted: f32,
+    doubted_ns: u64,
     refused: u64,
 }
 
@@ -155,6 +160,8 @@ impl Service for Localization {
             rest_level: [0.0; 2],
             believed: None,
             next_pose_ns: 0,
+            doubted: 0.0,
+            doubted_ns: 0,
             refused: 0,
         };
         if let Some(kept) = ports.retained::<Particles>()? {
@@ -351,7 +358,9 @@ impl Localization {
         if let Some(mut pose) = self.poses.loan() {
             fill(&mut pose, now, &b.estimate, &p, b.count, walls);
             pose.adrift_ns = self.adrift_ns;
-            pose.p_lost = pose.p_lost.max(self.least_doubt());
+            let faded = self.doubted * (-seconds(self.doubted_ns, now) as f32 / FADES_S).exp();
+            pose.p_lost = pose.p_lost.max(self.least_doubt()).max(faded);
+            (self.doubted, self.doubted_ns) = (pose.p_lost, now);
             pose.searching = u32::from(self.seek.why() == Some(Why::Start));
             pose.send();
         }

@@ -207,16 +207,49 @@ fn shield_at_rest() -> Shield {
 #[test]
 fn near_things_push_and_a_person_ahead_stops() {
     let mut shield = eight();
-    for k in 0..8 {
-        let echo = if k == 0 { Echo::Range(0.15) } else { Echo::Nothing };
-        shield.hear(k, Look { at_ns: 0, heading: 0.0, place: None, echo });
-    }
     let (footing, low) = (somewhere(), Footing { clearance_m: 0.0, ..somewhere() });
-    let still = shield.guard(0, to(0.0, 0.0), &footing, &Surroundings::default()).velocity;
-    assert!(still.x < -0.01 && still.x >= -0.2 && still.y.abs() < 1e-6, "{still:?}");
-    assert_eq!(shield.guard(0, to(0.0, 0.0), &low, &Surroundings::default()).velocity, Vector::ZERO);
-    let ahead = shield.guard(0, to(0.5, 0.0), &low, &Surroundings::default()).velocity;
+    let mut still = |at_ns: u64, range: f32, footing: &Footing| {
+        for k in 0..8 {
+            let echo = if k == 0 { Echo::Range(range) } else { Echo::Nothing };
+            shield.hear(k, Look { at_ns, heading: 0.0, place: None, echo });
+        }
+        (shield.guard(at_ns, to(0.0, 0.0), footing, &Surroundings::default()).velocity, shield.clone())
+    };
+    assert_eq!(still(0, 0.15, &footing).0, Vector::ZERO, "heard once it may be an outlier");
+    assert_eq!(still(200_000_000, 0.8, &footing).0, Vector::ZERO, "and what jumps is another thing");
+    assert_eq!(still(400_000_000, 0.15, &low).0, Vector::ZERO, "near the floor it may be the floor");
+    let (pushed, shield) = still(600_000_000, 0.15, &footing);
+    assert!(pushed.x < -0.01 && pushed.x >= -0.2 && pushed.y.abs() < 1e-6, "{pushed:?}");
+    let ahead = shield.guard(600_000_000, to(0.5, 0.0), &low, &Surroundings::default()).velocity;
     assert!(shield.braking().distance(ahead.x) <= 0.15 + MOUNT - RADIUS);
+}
+
+/// A face that is looked at askance loses every third ping; one that is gone is heard through three times.
+#[test]
+fn a_near_thing_outlives_two_lost_pings_and_not_three() {
+    let mut shield = eight();
+    let turn = 180_000_000;
+    shield.set_sweep(0.18);
+    for (k, (heard, stands)) in [
+        (true, true),
+        (true, true),
+        (false, true),
+        (true, true),
+        (false, true),
+        (false, true),
+        (false, false),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let now = k as u64 * turn;
+        for sonar in 0..8 {
+            let echo = if heard && sonar == 0 { Echo::Range(0.4) } else { Echo::Nothing };
+            shield.hear(sonar, Look { at_ns: now, heading: 0.0, place: None, echo });
+        }
+        let free = shield.free_way(now, Vector::new(1.0, 0.0), &somewhere());
+        assert_eq!(free < 0.3, stands, "ping {k}: {free}");
+    }
 }
 
 #[test]

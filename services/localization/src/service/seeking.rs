@@ -154,7 +154,7 @@ impl Localization {
         start.p_lost = found.doubt.max(FOUND_DOUBT);
         let mut generator = Generator::new(self.seed ^ self.sent);
         // What is heard from now on has had no part in the finding.
-        (self.elsewhere, self.unconfirmed) = (0.0, false);
+        (self.elsewhere, self.unconfirmed, self.doubted) = (0.0, false, 0.0);
         self.seek.begin(Why::Check, heading_offset);
         let update = self.filter.start_at(&start, crate::set::columns_mut(&mut loan), &mut generator);
         self.believed = Some(self.send(now, time_ns, &update, &generator, loan));
@@ -175,7 +175,7 @@ impl Localization {
                 None => self.seek.begin(Why::Audit, 0.0),
             },
             Some(Why::Audit) if e.p_lost >= DOUBT_BEGINS => self.seek.begin(Why::Lost, e.heading_offset),
-            Some(Why::Check) if self.seek.is_unconfirmed() => {
+            Some(Why::Check | Why::Audit) if self.seek.is_refuted() => {
                 self.unconfirmed = true;
                 self.seek.begin(Why::Lost, e.heading_offset);
             }

@@ -10,7 +10,8 @@ mod tests;
 pub use coverage::{Coverage, ROOM_M, SEEN_M};
 pub use honesty::{Class, EDGES, Honesty, SURE, WRONG_M};
 pub use report::{
-    CoverageTotal, ErrorColumn, FlightReport, HeadingColumn, Outcome, Report, Totals, quantile,
+    Claim, CoverageTotal, ErrorColumn, FirstClaims, FlightReport, HeadingColumn, Outcome, Report, Totals,
+    quantile,
 };
 
 use crate::world::World;
@@ -22,6 +23,8 @@ pub const PAD_RADIUS_M: f32 = 0.35;
 pub const LOST_M: f32 = 0.5;
 /// A first fix must stay good for so long, seconds: a mean of scattered guesses may pass the truth by chance.
 const FIX_HOLDS_S: f64 = 1.0;
+/// From this P(lost) down the drone says that it knows its place: autonomy begins (DESIGN 4).
+const CLAIMED: f32 = 0.05;
 /// Errors are kept at this period, seconds: 20 Hz poses bring nothing more.
 const ERROR_PERIOD_S: f64 = 0.05;
 
@@ -81,6 +84,7 @@ pub struct Scorer {
     last_place: Option<(f32, f32)>,
     good_since: Option<f64>,
     first_fix_s: Option<f64>,
+    claim: Option<Claim>,
     lost_s: f64,
     last_s: Option<f64>,
     confessor: Confessor,
@@ -110,6 +114,7 @@ impl Scorer {
             last_place: None,
             good_since: None,
             first_fix_s: None,
+            claim: None,
             lost_s: 0.0,
             last_s: None,
             confessor: Confessor::default(),
@@ -137,6 +142,11 @@ impl Scorer {
         self.last_place = Some((seen.x, seen.y));
         if let (Some((metres, _)), Some(p_lost)) = (error, seen.p_lost) {
             self.confessor.hear(seen.time_s, dt, metres, p_lost);
+            if self.claim.is_none() && p_lost < CLAIMED {
+                let since = seen.time_s - self.start_s.unwrap_or(seen.time_s);
+                self.claim =
+                    Some(Claim { time_s: report::rounded(since as f32), error_m: report::rounded(metres) });
+            }
         }
         if self.first_fix_s.is_none() {
             return;
@@ -202,6 +212,7 @@ impl Scorer {
             loc_error_m: ErrorColumn::of(&mut self.errors),
             heading_error_rad: HeadingColumn::of(&mut self.heading_errors),
             first_fix_s: self.first_fix_s.map(|s| report::rounded(s as f32)),
+            first_claim: self.claim,
             lost_s: report::rounded(self.lost_s as f32),
             failsafes: ending.failsafes,
             skipped: ending.skipped,

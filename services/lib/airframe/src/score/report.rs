@@ -1,6 +1,6 @@
 //! The figures of flights, with the keys that DESIGN 5 promises.
 
-use super::{FlightScore, Honesty};
+use super::{FlightScore, Honesty, LOST_M};
 use serde::{Deserialize, Serialize};
 
 /// How a flight ended.
@@ -66,6 +66,41 @@ impl HeadingColumn {
     }
 }
 
+/// The first time in the air that the drone said to know its place: P(lost) under 5 %.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Claim {
+    /// Since the take-off, seconds.
+    pub time_s: f64,
+    /// How far off it was, metres.
+    pub error_m: f64,
+}
+
+/// First claims over flights.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FirstClaims {
+    /// Flights that said to know their place at all.
+    pub made: usize,
+    /// Of these within 0.5 m of the truth.
+    pub right: usize,
+    /// Half of the flights that made one had made it by then, seconds since the take-off; `null` when none did.
+    pub median_s: Option<f64>,
+    /// Nineteen of twenty of these, seconds.
+    pub p95_s: Option<f64>,
+}
+
+impl FirstClaims {
+    fn of(flights: &[FlightReport]) -> Self {
+        let claims = flights.iter().filter_map(|flight| flight.first_claim);
+        let mut times: Vec<f32> = claims.clone().map(|claim| claim.time_s as f32).collect();
+        Self {
+            made: times.len(),
+            right: claims.filter(|claim| claim.error_m <= f64::from(LOST_M)).count(),
+            median_s: quantile(&mut times, 0.5).map(rounded),
+            p95_s: quantile(&mut times, 0.95).map(rounded),
+        }
+    }
+}
+
 /// One flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FlightReport {
@@ -89,6 +124,8 @@ pub struct FlightReport {
     pub heading_error_rad: HeadingColumn,
     /// From take-off to the first estimate within 0.5 m of the truth that stayed so; `null` for never.
     pub first_fix_s: Option<f64>,
+    /// When the drone first said in the air that it knows its place, and how far off it was; `null` for never.
+    pub first_claim: Option<Claim>,
     /// Time in the air since then with an error over 0.5 m, seconds.
     pub lost_s: f64,
     /// Failsafes that acted.
@@ -129,6 +166,8 @@ pub struct Totals {
     pub loc_error_m: ErrorColumn,
     /// Smallest clearance of any flight, metres.
     pub min_clearance_m: f64,
+    /// When the flights first said to know their place, and how many were right.
+    pub first_claims: FirstClaims,
     /// P(lost) against the truth, over all flights.
     pub honesty: Honesty,
     /// Simulated over wall seconds, summed over flights flown at once: the one figure that may differ
@@ -167,6 +206,7 @@ impl Report {
             coverage: CoverageTotal { median: share(&mut coverage, 0.5), p5: share(&mut coverage, 0.05) },
             loc_error_m: ErrorColumn::of(&mut pooled),
             min_clearance_m: if nearest.is_finite() { nearest } else { 0.0 },
+            first_claims: FirstClaims::of(&reports),
             honesty: honesty.rounded(),
             real_time_factor,
         };

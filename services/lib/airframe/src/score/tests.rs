@@ -80,6 +80,41 @@ fn being_lost_is_what_the_truth_says() {
 }
 
 #[test]
+fn the_first_claim_is_the_first_time_that_it_says_to_know_its_place() {
+    let world = room();
+    let claimed = |says: &dyn Fn(f64) -> Option<f32>, off: f32| {
+        let mut scorer = Scorer::new(&world, 0.2);
+        for k in 0..200u32 {
+            let time_s = f64::from(k) * 0.05;
+            let estimate = Some((2.0 + off, 1.5, 0.0));
+            let seen = Observation {
+                time_s,
+                x: 2.0,
+                y: 1.5,
+                yaw: 0.0,
+                airborne: time_s >= 2.0,
+                estimate,
+                p_lost: says(time_s),
+            };
+            scorer.observe(&world, &seen);
+        }
+        scorer.finish(&world, ending((2.0, 1.5)))
+    };
+    let after_5 = |time_s: f64| (time_s >= 4.0).then_some(if time_s >= 5.0 { 0.03 } else { 0.2 });
+    let claim = claimed(&after_5, 0.7).report.first_claim.expect("it said so");
+    assert!((claim.time_s - 3.0).abs() < 0.06 && (claim.error_m - 0.7).abs() < 1e-3, "{claim:?}");
+    assert_eq!(claimed(&|_| Some(0.06), 0.0).report.first_claim, None, "what is doubted is no claim");
+    let report =
+        Report::of(vec![claimed(&after_5, 0.7), claimed(&|_| None, 0.0), claimed(&|_| Some(0.0), 0.1)], 1.0);
+    let claims = report.total.first_claims;
+    assert_eq!((claims.made, claims.right), (2, 1));
+    assert!(
+        (claims.p95_s.expect("two claims") - 3.0).abs() < 0.06 && claims.median_s == Some(0.0),
+        "{claims:?}"
+    );
+}
+
+#[test]
 fn totals_pool_errors_over_time_and_coverage_over_flights() {
     let world = room();
     let good = flown(&world, 0.04).finish(&world, ending((2.0, 1.5)));
@@ -115,6 +150,7 @@ fn the_keys_are_those_of_the_design() {
         "max = ",
         "[flights.heading_error_rad]",
         "first_fix_s = 0.0",
+        "[flights.first_claim]",
         "lost_s = 0.0",
         "failsafes = []",
         "skipped = [\"Store 2: door closed\"]",
@@ -126,6 +162,7 @@ fn the_keys_are_those_of_the_design() {
         "landed_on_pad = 1",
         "[total.coverage]",
         "p5 = ",
+        "[total.first_claims]",
         "[total.loc_error_m]",
         "real_time_factor = 120.0",
     ] {

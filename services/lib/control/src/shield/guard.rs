@@ -144,10 +144,10 @@ impl Shield {
         brake
     }
 
-    /// Away from what is near: both jambs of a door push alike, which centres.
+    /// Away from what is near and was heard twice: both jambs of a door push alike, which centres.
     fn push(&self, now: u64, flown: Vector, floor_m: f32) -> Vector {
         let mut push = Vector::ZERO;
-        for hit in self.hits(now, flown) {
+        for hit in self.hits(now, flown).filter(|hit| hit.confirmed) {
             let Some((towards, gap)) = self.side(&hit).filter(|_| hit.range < floor_m) else { continue };
             let missing = self.config.near_m - gap;
             if missing > 0.0 {
@@ -161,7 +161,8 @@ impl Shield {
     fn plan_push(&self, footing: &Footing, plan: &Surroundings<'_>) -> Vector {
         let c = &self.config;
         let Some(place) = footing.place.filter(|_| footing.sigma_m <= PUSHED_M) else { return Vector::ZERO };
-        let fields = [(plan.walls, c.plan_near_m + c.plan_margin_m), (plan.zones, c.zone_margin_m)];
+        let fields =
+            [(plan.walls, c.plan_near_m + c.plan_margin_m + footing.sigma_m), (plan.zones, c.zone_margin_m)];
         fields.into_iter().fold(Vector::ZERO, |push, (field, room)| {
             let Some(field) = field else { return push };
             let missing = room - (field.distance(place.x, place.y) - self.radius_m);

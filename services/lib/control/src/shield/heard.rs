@@ -11,8 +11,15 @@ const INSIDE_M: f32 = 0.03;
 const CLOSING_S: f32 = 0.8;
 /// Nothing indoors comes nearer faster than this, m/s: a person who walks, and the drone. What does is another echo.
 const FASTEST_M_S: f32 = 2.0;
-/// A hit is moved by what was flown since its ping for no longer than this, seconds: two turns of the flown sweep.
-const MOVED_S: f32 = 0.4;
+/// A hit is moved by what was flown since its ping for no longer than this, seconds: as long as one is kept.
+const MOVED_S: f32 = 0.6;
+/// What was heard from nearer than this, metres, is not gone because one ping or two did not hear it: at the edge of what
+/// a face answers to, every third is lost. It is kept for so many pings, and for so long, seconds.
+const KEPT_M: f32 = 1.0;
+const KEPT_MISSED: u8 = 2;
+const KEPT_S: f32 = 0.6;
+/// Two echoes in a row that differ by less than this, metres, and what a person walks meanwhile, are of one thing.
+const AGREE_M: f32 = 0.1;
 
 /// One side sonar.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +29,8 @@ pub(super) struct Sensor {
     pub(super) look: Option<Look>,
     /// The echoes before the newest, the newest of them first.
     before: [Option<(u64, f32)>; 2],
+    /// The last echo from near.
+    kept: Option<Kept>,
     /// Pings that did not hear a wall which it looked squarely at, less those that did.
     missed: u8,
     /// The range that it has said again and again, and where the drone was when it began to.
@@ -30,9 +39,29 @@ pub(super) struct Sensor {
     stuck: bool,
 }
 
+/// An echo from near, and how it was followed.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    at_ns: u64,
+    heading: f32,
+    range: f32,
+    /// Another one before it said the same.
+    confirmed: bool,
+    missed: u8,
+}
+
 impl Sensor {
     pub(super) fn new(bearing: f32, mount: Vector) -> Self {
-        Self { bearing, mount, look: None, before: [None; 2], missed: 0, still: None, stuck: false }
+        Self {
+            bearing,
+            mount,
+            look: None,
+            before: [None; 2],
+            kept: None,
+            missed: 0,
+            still: None,
+            stuck: false,
+        }
     }
 
     fn take(&mut self, look: Look) {
@@ -42,7 +71,25 @@ impl Sensor {
         });
         self.before = [last, self.before[0].filter(|_| last.is_some())];
         self.watch(&look);
+        self.keep(&look);
         self.look = Some(look);
+    }
+
+    fn keep(&mut self, look: &Look) {
+        let before = self.kept.take().filter(|kept| seconds(kept.at_ns, look.at_ns) < KEPT_S);
+        self.kept = match look.echo {
+            Echo::Range(range) if range < KEPT_M => {
+                let agrees = |kept: Kept| {
+                    let walked = FASTEST_M_S * seconds(kept.at_ns, look.at_ns);
+                    (kept.range - range).abs() < AGREE_M + walked
+                };
+                let confirmed = before.is_some_and(agrees);
+                Some(Kept { at_ns: look.at_ns, heading: look.heading, range, confirmed, missed: 0 })
+            }
+            _ => before
+                .map(|kept| Kept { missed: kept.missed + 1, ..kept })
+                .filter(|kept| kept.missed <= KEPT_MISSED),
+        };
     }
 
     /// A range that stays the same while the drone comes nearer to what it is heard from, or leaves it, is no range.
@@ -114,6 +161,8 @@ pub(super) struct Hit {
     pub(super) centre: Vector,
     /// How fast it comes nearer by its echoes alone, m/s.
     pub(super) closing: Option<f32>,
+    /// It was heard twice: no outlier.
+    pub(super) confirmed: bool,
 }
 
 impl Shield {
@@ -184,14 +233,26 @@ impl Shield {
 
     /// Fresh echoes, where they lie now for a drone that has flown with `flown` since.
     pub(super) fn hits(&self, now: u64, flown: Vector) -> impl Iterator<Item = Hit> + '_ {
-        self.sensors.iter().flatten().filter_map(move |sensor| {
-            let look = self.fresh(sensor, now)?;
-            let Echo::Range(range) = look.echo else { return None };
-            let axis = sensor.bearing + look.heading;
-            let moved = flown * seconds(look.at_ns, now).min(MOVED_S);
-            let face = sensor.mount.rotated(look.heading) - moved;
-            let centre = face + Vector::along(axis) * range;
-            Some(Hit { axis, face, range, centre, closing: sensor.closing() })
+        self.sensors.iter().flatten().flat_map(move |sensor| {
+            let hit = move |at_ns: u64, heading: f32, range: f32| {
+                let axis = sensor.bearing + heading;
+                let moved = flown * seconds(at_ns, now).min(MOVED_S);
+                let face = sensor.mount.rotated(heading) - moved;
+                let centre = face + Vector::along(axis) * range;
+                Hit { axis, face, range, centre, closing: None, confirmed: true }
+            };
+            let fresh = self.fresh(sensor, now).and_then(|look| match look.echo {
+                Echo::Range(range) => {
+                    let unsure = sensor.kept.is_some_and(|kept| kept.at_ns == look.at_ns && !kept.confirmed);
+                    let hit = hit(look.at_ns, look.heading, range);
+                    Some(Hit { closing: sensor.closing(), confirmed: !unsure, ..hit })
+                }
+                Echo::Nothing => None,
+            });
+            let kept = sensor.kept.filter(|kept| kept.missed > 0 && seconds(kept.at_ns, now) < KEPT_S);
+            let kept = kept
+                .map(|kept| Hit { confirmed: kept.confirmed, ..hit(kept.at_ns, kept.heading, kept.range) });
+            fresh.into_iter().chain(kept)
         })
     }
 }

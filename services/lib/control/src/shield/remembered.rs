@@ -20,6 +20,9 @@ const THROUGH_RAD: f32 = 0.105;
 const THROUGH_M: f32 = 0.2;
 /// Echoes that make a thing: one may be an outlier (1 % are).
 const HEARD: u8 = 2;
+/// What was heard so often is gone only when it was heard through three times: at its edge a face answers one ping and lets
+/// the next one pass.
+const SURELY: u8 = 4;
 
 #[derive(Clone, Copy, Debug)]
 struct Point {
@@ -48,7 +51,10 @@ impl Remembered {
                 let ray = point.at - face;
                 let aside = wrap_angle(ray.angle() - axis).abs();
                 if aside < THROUGH_RAD && ray.norm() < range_m - THROUGH_M {
-                    *slot = None;
+                    point.times = point.times.saturating_sub(1);
+                    if point.times < HEARD {
+                        *slot = None;
+                    }
                 }
             }
         }
@@ -58,7 +64,7 @@ impl Remembered {
         }
         if let Some(point) = self.points.iter_mut().flatten().find(|point| (point.at - at).norm() < SAME_M) {
             point.at = point.at + (at - point.at) * 0.5;
-            point.times = point.times.saturating_add(1);
+            point.times = (point.times + 1).min(SURELY);
             point.heard_ns = now;
             return;
         }

@@ -126,12 +126,18 @@ impl Shield {
         let Some(place) = footing.place else { return speed };
         let speed = speed.min(braking.speed(self.zone_way(place, direction, footing, plan.zones)));
         let Some(walls) = plan.walls else { return speed };
-        let sigma = if footing.sigma_m.is_finite() { footing.sigma_m.clamp(0.0, 0.08) } else { 0.08 };
+        let unsure = if footing.sigma_m.is_finite() { footing.sigma_m.max(0.0) } else { f32::INFINITY };
+        let sigma = unsure.min(SURE_M);
         let soft = Self::plan_way(walls, place, direction, self.radius_m + c.plan_margin_m + sigma);
-        let overlap = (sigma - SURE_M).clamp(-c.plan_margin_m, c.plan_overlap_m);
+        let overlap = (2.0 * (unsure - SURE_M)).clamp(-c.plan_near_m, c.plan_overlap_m);
         let hard = Self::plan_way(walls, place, direction, (self.radius_m - overlap).max(0.05));
         // Where no cone looks, nobody says that the plan is wrong.
-        let creep = if seen == Sight::Cone { c.creep_m_s.min(braking.speed(hard)) } else { 0.0 };
+        let meets = place + direction * soft;
+        let (x, y) = walls.gradient(meets.x, meets.y);
+        let wall = Vector::new(x, y) * -walls.distance(meets.x, meets.y);
+        let towards = (direction * soft + wall).angle() - footing.heading;
+        let looks = seen == Sight::Cone && self.sight(now, wrap_angle(towards)) == Sight::Cone;
+        let creep = if looks { c.creep_m_s.min(braking.speed(hard)) } else { 0.0 };
         speed.min(braking.speed(soft).max(creep))
     }
 }

@@ -47,20 +47,22 @@ pub struct Trail {
     count: usize,
     last: Option<TrailPose>,
     way_m: f32,
+    longest_s: f64,
 }
 
 const NONE: Heard = Heard { x: 0.0, y: 0.0, axis_rad: 0.0, echo: Echo::Nothing, way_m: 0.0, time_s: 0.0 };
 
 impl Default for Trail {
     fn default() -> Self {
-        Self { heard: [NONE; MAX_HEARD], count: 0, last: None, way_m: 0.0 }
+        Self { heard: [NONE; MAX_HEARD], count: 0, last: None, way_m: 0.0, longest_s: LONGEST_S }
     }
 }
 
 impl Trail {
-    /// Forgets everything: the frame has jumped.
-    pub fn clear(&mut self) {
-        *self = Self::default();
+    /// Forgets everything: the frame has jumped. From now on nothing older than `longest_s` is kept, seconds, and nothing
+    /// older than 25 s in any case.
+    pub fn clear(&mut self, longest_s: f64) {
+        *self = Self { longest_s: longest_s.min(LONGEST_S), ..Self::default() };
     }
 
     /// Readings kept.
@@ -149,8 +151,9 @@ impl Trail {
 
     /// Drops what lies too far back.
     fn forget(&mut self, now_s: f64) {
-        let old =
-            |heard: &&Heard| self.way_m - heard.way_m > LONGEST_WAY_M || now_s - heard.time_s > LONGEST_S;
+        let old = |heard: &&Heard| {
+            self.way_m - heard.way_m > LONGEST_WAY_M || now_s - heard.time_s > self.longest_s
+        };
         let old = self.heard().iter().take_while(old).count();
         self.heard[..self.count].rotate_left(old);
         self.count -= old;
@@ -207,7 +210,7 @@ mod tests {
         assert_eq!(trail.len(), 21);
         trail.push(30.0, &TrailPose { x: 15.6, ..TrailPose::default() }, &[reading(90.0, 1.0)]);
         assert_eq!(trail.len(), 1, "the rest was heard too long ago");
-        trail.clear();
+        trail.clear(f64::INFINITY);
         assert!(trail.is_empty() && trail.around() == 0.0);
     }
 
