@@ -19,6 +19,7 @@ mod service;
 mod set;
 mod start;
 mod sweep;
+mod tally;
 mod velocity;
 
 pub use attitude::{Attitudes, Mean};

@@ -5,6 +5,7 @@
 //! What two searches in a row agree on, each nearly sure by itself, is where the drone is.
 
 use crate::attitude::seconds;
+use crate::tally::Tally;
 use floorplan::{ConeTable, Rooms};
 use mcl::{Hypothesis, Lattice, Reading, Search, SonarConfig, Trail, TrailPose, Turns, wrap_angle};
 use std::sync::Arc;
@@ -32,19 +33,6 @@ const AGREED_LOST_S: f64 = 5.0;
 /// where it was, metres, needs so much better readings.
 const NEAR_BY_M: f32 = 4.0;
 const FAR_SHARE: f32 = 0.1;
-/// What searches say of a place that is believed is added up: the log odds of it against the likeliest other place, each
-/// bounded, and worth as much as it was heard anew since the search before (metres of the way and seconds for a whole one).
-const SAYS_MOST: f32 = 2.0;
-const SAYS_LEAST: f32 = 0.02;
-const ANEW_M: f32 = 2.0;
-const ANEW_S: f32 = 6.0;
-/// A place that was found is confirmed by so much, this far from where it was found, metres, and refuted by so much.
-const CONFIRMED: f32 = 3.0;
-const CONFIRMED_M: f32 = 3.0;
-const REFUTED: f32 = -3.0;
-/// What a place that is believed may have saved up, and when it is suspected: two searches in a row for another one.
-const SAVED: f32 = 1.0;
-const SUSPECTED: f32 = -2.9;
 /// A check needs so many readings.
 const CHECK_READINGS: usize = 60;
 /// And of which the place explains so much of what was heard: among clutter and behind a door that is shut the true one
@@ -115,32 +103,6 @@ const AUDIT_TURN_RAD: f32 = 0.25;
 const AUDIT_EVERY_S: f64 = 6.0;
 /// And hears the last seconds only: what was heard before speaks for the place that was left.
 const AUDITED_S: f64 = 14.0;
-/// What the searches have said of the believed place so far.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tally {
-    log_odds: f32,
-    /// Where it began, and where and when the last search was, in the trail's frame.
-    from: Option<(f32, f32)>,
-    last: Option<(u64, f32, f32)>,
-}
-
-impl Tally {
-    /// Adds one search: shares of the believed place and of the likeliest other.
-    fn add(&mut self, now: u64, here: &TrailPose, [this, other]: [f32; 2], most: f32) {
-        let anew = self.last.map_or(1.0, |(at, x, y)| {
-            (here.x - x).hypot(here.y - y) / ANEW_M + seconds(at, now) as f32 / ANEW_S
-        });
-        let says = ((this + SAYS_LEAST) / (other + SAYS_LEAST)).ln().clamp(-SAYS_MOST, SAYS_MOST);
-        self.log_odds = (self.log_odds + anew.min(1.0) * says).min(most);
-        self.from.get_or_insert((here.x, here.y));
-        self.last = Some((now, here.x, here.y));
-    }
-
-    fn moved_m(&self, here: &TrailPose) -> f32 {
-        self.from.map_or(0.0, |(x, y)| (here.x - x).hypot(here.y - y))
-    }
-}
-
 /// The room that the drone is known to be in.
 struct Within {
     rooms: Arc<Rooms>,
@@ -224,8 +186,8 @@ impl Seek {
     /// Whether the searches have spoken against the place that is believed: one that was found, or any.
     pub(crate) fn is_refuted(&self) -> bool {
         match self.why {
-            Some(Why::Check) => self.tally.log_odds <= REFUTED,
-            Some(Why::Audit) => self.tally.log_odds <= SUSPECTED,
+            Some(Why::Check) => self.tally.is_refuted(),
+            Some(Why::Audit) => self.tally.is_suspected(),
             Some(Why::Start | Why::Lost) | None => false,
         }
     }
@@ -324,16 +286,13 @@ impl Seek {
         let wait_s = if self.why == Some(Why::Lost) { AGREED_LOST_S } else { AGREED_S };
         let waited = seconds(answer.agreed_ns, now) >= wait_s;
         if let Some((sx, sy, _)) = suspect {
-            let most = if self.why == Some(Why::Audit) { SAVED } else { f32::INFINITY };
             let shares = self.shares((sx, sy), here);
-            self.tally.add(now, here, shares, most);
+            self.tally.add(now, here, shares, self.why == Some(Why::Audit));
         }
         let confirms = suspect.is_some_and(|(sx, sy, _)| (x - sx).hypot(y - sy) < NEAR_M);
         self.strays = self.why == Some(Why::Audit) && !confirms && share >= FAIRLY_SURE;
         let sure = match self.why {
-            Some(Why::Check) if confirms => {
-                self.tally.log_odds >= CONFIRMED && self.tally.moved_m(here) >= CONFIRMED_M
-            }
+            Some(Why::Check) if confirms => self.tally.is_confirmed(here),
             Some(Why::Audit) if confirms => share >= SURE,
             // Who turns to and fro among things that no plan shows hears the same things for ever: what is believed is
             // given up for what was believable from two places.

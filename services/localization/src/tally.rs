@@ -1,0 +1,120 @@
+//! What search after search says of a place that is believed.
+//!
+//! One search among furniture that no plan shows is an opinion; what they say one after the other, as far as each has heard
+//! anew, adds up to a verdict: the sequential test of Wald 1945, with bounded steps because readings of one corridor
+//! resemble each other.
+
+use crate::attitude::seconds;
+use mcl::TrailPose;
+
+/// Log odds of the place against the likeliest other one: a search says this much at most, and a share counts for this
+/// much at least.
+const SAYS_MOST: f32 = 2.0;
+const SAYS_LEAST: f32 = 0.02;
+/// A search counts wholly after so much of new way, metres, or so long, seconds.
+const ANEW_M: f32 = 2.0;
+const ANEW_S: f32 = 6.0;
+/// A place that was found is confirmed by so much, this far from where it was found, metres, and refuted by so much.
+const CONFIRMED: f32 = 3.0;
+const CONFIRMED_M: f32 = 3.0;
+const REFUTED: f32 = -3.0;
+/// What a place that is believed may have saved up, and when it is suspected: two searches in a row for another one.
+const SAVED: f32 = 1.0;
+const SUSPECTED: f32 = -2.9;
+
+/// The sum so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tally {
+    log_odds: f32,
+    /// Where it began, and where and when the last search was, in the trail's frame.
+    from: Option<(f32, f32)>,
+    last: Option<(u64, f32, f32)>,
+}
+
+impl Tally {
+    /// Adds one search that ended `here`: its shares of the place and of the likeliest other one. A place that has been
+    /// `believed` for long saves up little, so that it can be suspected before long.
+    pub(crate) fn add(&mut self, now: u64, here: &TrailPose, [this, other]: [f32; 2], believed: bool) {
+        let anew = self.last.map_or(1.0, |(at, x, y)| {
+            (here.x - x).hypot(here.y - y) / ANEW_M + seconds(at, now) as f32 / ANEW_S
+        });
+        let says = ((this + SAYS_LEAST) / (other + SAYS_LEAST)).ln().clamp(-SAYS_MOST, SAYS_MOST);
+        let most = if believed { SAVED } else { f32::INFINITY };
+        self.log_odds = (self.log_odds + anew.min(1.0) * says).min(most);
+        self.from.get_or_insert((here.x, here.y));
+        self.last = Some((now, here.x, here.y));
+    }
+
+    /// Whether a place that was found is the one, as far as it was flown since.
+    pub(crate) fn is_confirmed(&self, here: &TrailPose) -> bool {
+        let moved_m = self.from.map_or(0.0, |(x, y)| (here.x - x).hypot(here.y - y));
+        self.log_odds >= CONFIRMED && moved_m >= CONFIRMED_M
+    }
+
+    /// Whether a place that was found is another one.
+    pub(crate) fn is_refuted(&self) -> bool {
+        self.log_odds <= REFUTED
+    }
+
+    /// Whether a place that is believed may be another one.
+    pub(crate) fn is_suspected(&self) -> bool {
+        self.log_odds <= SUSPECTED
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const S: u64 = 1_000_000_000;
+
+    fn at(x: f32) -> TrailPose {
+        TrailPose { x, ..TrailPose::default() }
+    }
+
+    #[test]
+    fn two_searches_confirm_a_place_that_was_left_and_not_one_that_was_not() {
+        let mut tally = Tally::default();
+        tally.add(0, &at(0.0), [0.99, 0.01], false);
+        assert!(!tally.is_confirmed(&at(9.0)), "one search is an opinion");
+        tally.add(6 * S, &at(0.1), [0.99, 0.01], false);
+        assert!(!tally.is_confirmed(&at(0.1)) && tally.is_confirmed(&at(3.1)));
+        // Doubtful ones say little, to neither side.
+        for k in 2..10 {
+            tally.add(6 * k * S, &at(0.1), [0.4, 0.45], false);
+        }
+        assert!(tally.is_confirmed(&at(3.1)) && !tally.is_refuted());
+    }
+
+    #[test]
+    fn what_is_heard_again_and_again_on_the_spot_is_one_opinion() {
+        let mut tally = Tally::default();
+        tally.add(0, &at(0.0), [0.99, 0.01], true);
+        for k in 1..=10 {
+            tally.add(k * S / 2, &at(0.0), [0.0, 1.0], true);
+        }
+        assert!(!tally.is_suspected(), "five seconds on the spot");
+        for k in 3..=4 {
+            tally.add(6 * k * S, &at(0.0), [0.0, 1.0], true);
+        }
+        assert!(tally.is_suspected());
+    }
+
+    #[test]
+    fn long_belief_saves_up_little() {
+        let mut tally = Tally::default();
+        for k in 0..100 {
+            tally.add(6 * k * S, &at(k as f32), [1.0, 0.0], true);
+        }
+        for k in 100..102 {
+            assert!(!tally.is_suspected());
+            tally.add(6 * k * S, &at(k as f32), [0.0, 0.9], true);
+        }
+        assert!(tally.is_suspected());
+        let mut found = Tally::default();
+        for k in 0..2 {
+            found.add(6 * k * S, &at(k as f32), [0.01, 0.9], false);
+        }
+        assert!(found.is_refuted());
+    }
+}
