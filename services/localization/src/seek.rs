@@ -5,7 +5,7 @@
 //! What two searches in a row agree on, each nearly sure by itself, is where the drone is.
 
 use crate::attitude::seconds;
-use crate::tally::Tally;
+use crate::tally::{Opinion, Tally};
 use floorplan::{ConeTable, Rooms};
 use mcl::{Hypothesis, Lattice, Reading, Search, SonarConfig, Trail, TrailPose, Turns, wrap_angle};
 use std::sync::Arc;
@@ -192,15 +192,22 @@ impl Seek {
         }
     }
 
-    /// Shares of the last search: of the place `at`, and of the likeliest other one.
-    fn shares(&self, at: (f32, f32), here: &TrailPose) -> [f32; 2] {
+    /// What the last search says of the place `at`, and of the likeliest other one.
+    fn opinions(&self, at: (f32, f32), here: &TrailPose) -> [Opinion; 2] {
+        let origin = self.search.origin();
+        let all = self.search.hypotheses().iter().map(|of| (carried(of, &origin, here), of));
         let near = |(x, y): (f32, f32), (hx, hy, _): (f32, f32, f32)| (hx - x).hypot(hy - y) < NEAR_M;
-        let away = self.hypotheses(here).filter(|(of, _)| !near(at, *of));
-        let other = away.max_by(|a, b| a.1.total_cmp(&b.1)).map(|((x, y, _), _)| (x, y));
-        let of = |place: (f32, f32)| -> f32 {
-            self.hypotheses(here).filter(|(of, _)| near(place, *of)).map(|(_, share)| share).sum()
+        let away = all.clone().filter(|(of, _)| !near(at, *of));
+        let other = away.max_by(|a, b| a.1.weight.total_cmp(&b.1.weight)).map(|((x, y, _), _)| (x, y));
+        let of = |place: (f32, f32)| {
+            all.clone().filter(|(of, _)| near(place, *of)).fold(Opinion::default(), |sum, (_, of)| Opinion {
+                share: sum.share + of.weight,
+                explained: sum.explained.max(of.explained),
+            })
         };
-        [of(at), other.map_or(0.0, |other| of(other).min(1.0 - of(at)))]
+        let this = of(at);
+        let other = other.map_or_else(Opinion::default, of);
+        [this, Opinion { share: other.share.min(1.0 - this.share), ..other }]
     }
 
     pub(crate) fn hear(&mut self, time_ns: u64, here: &TrailPose, readings: &[Reading]) {
@@ -286,8 +293,8 @@ impl Seek {
         let wait_s = if self.why == Some(Why::Lost) { AGREED_LOST_S } else { AGREED_S };
         let waited = seconds(answer.agreed_ns, now) >= wait_s;
         if let Some((sx, sy, _)) = suspect {
-            let shares = self.shares((sx, sy), here);
-            self.tally.add(now, here, shares, self.why == Some(Why::Audit));
+            let opinions = self.opinions((sx, sy), here);
+            self.tally.add(now, here, opinions, self.why == Some(Why::Audit));
         }
         let confirms = suspect.is_some_and(|(sx, sy, _)| (x - sx).hypot(y - sy) < NEAR_M);
         self.strays = self.why == Some(Why::Audit) && !confirms && share >= FAIRLY_SURE;
