@@ -100,7 +100,7 @@ pub(crate) struct Found {
 /// set that slips along a corridor while somebody stands in the way does so by decimetres a minute, and unnoticed.
 const AUDIT_M: f32 = 4.0;
 const AUDIT_TURN_RAD: f32 = 0.25;
-const AUDIT_EVERY_S: f64 = 6.0;
+const AUDIT_EVERY_S: f64 = 3.0;
 /// And hears the last seconds only: what was heard before speaks for the place that was left.
 const AUDITED_S: f64 = 14.0;
 /// The room that the drone is known to be in.

@@ -15,7 +15,7 @@ const SAYS_LEAST: f32 = 0.02;
 /// second and half as loud again at most. Along a corridor the next door explains as much, and is likelier or not as it
 /// happens (shares of readings; 12 flights that were right: 0.08 at most, of displaced ones 0.08 to 0.45).
 const EXPLAINS_MORE: (f32, f32) = (0.04, 0.12);
-const LOUDEST: f32 = 1.5;
+const LOUDEST: f32 = 2.5;
 /// A search counts wholly after so much of new way, metres, or so long, seconds.
 const ANEW_M: f32 = 2.0;
 const ANEW_S: f32 = 6.0;

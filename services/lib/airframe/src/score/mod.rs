@@ -1,5 +1,6 @@
 //! Scoring a flight by the truth alone: never by what the drone believes (DESIGN 5).
 
+mod calibration;
 mod coverage;
 mod honesty;
 mod report;
@@ -7,6 +8,7 @@ mod sight;
 #[cfg(test)]
 mod tests;
 
+pub use calibration::calibration_svg;
 pub use coverage::{Coverage, ROOM_M, SEEN_M};
 pub use honesty::{Class, EDGES, Honesty, SURE, WRONG_M};
 pub use report::{
