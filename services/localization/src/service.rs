@@ -71,8 +71,8 @@ pub struct Localization {
     seek: Seek,
     /// Share of the last search for another place.
     elsewhere: f32,
-    /// A place that was found was not confirmed in time.
-    unconfirmed: bool,
+    /// The place was refuted by its check, or is suspected by the audits.
+    suspected: bool,
     /// What was being looked for before a restart, until it is looked for again.
     kept_why: Option<Why>,
     /// Number and time of the last set sent.
@@ -152,7 +152,7 @@ impl Service for Localization {
             set: Set::None,
             seek,
             elsewhere: 0.0,
-            unconfirmed: false,
+            suspected: false,
             kept_why: None,
             sent: 0,
             sent_ns: 0,
@@ -239,7 +239,7 @@ impl Localization {
                 return;
             }
             Seeking::Unchecked => self.kept_why = Some(Why::Check),
-            Seeking::Unconfirmed => (self.kept_why, self.unconfirmed) = (Some(Why::Lost), true),
+            Seeking::Suspected => (self.kept_why, self.suspected) = (Some(Why::Lost), true),
         }
         // What happened meanwhile is unknown: search with all there is.
         let mut memory = Memory::from_array(&kept.memory);

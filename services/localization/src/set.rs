@@ -19,8 +19,8 @@ pub(crate) enum Seeking {
     Hypotheses,
     /// Found, and not checked yet by what was heard after.
     Unchecked,
-    /// Found, and not confirmed in time.
-    Unconfirmed,
+    /// Refuted by its check, or suspected by the audits.
+    Suspected,
 }
 
 impl Seeking {
@@ -30,13 +30,13 @@ impl Seeking {
             Self::No => 0.0,
             Self::Hypotheses => 1.0,
             Self::Unchecked => 2.0,
-            Self::Unconfirmed => 3.0,
+            Self::Suspected => 3.0,
         }
     }
 
     /// What stands in a memory; anything else that is there says no.
     pub(crate) fn of(code: f32) -> Self {
-        let all = [Self::Hypotheses, Self::Unchecked, Self::Unconfirmed];
+        let all = [Self::Hypotheses, Self::Unchecked, Self::Suspected];
         all.into_iter().find(|seeking| seeking.code() == code).unwrap_or(Self::No)
     }
 }

@@ -23,9 +23,10 @@ const ANEW_S: f32 = 6.0;
 const CONFIRMED: f32 = 3.0;
 const CONFIRMED_M: f32 = 3.0;
 const REFUTED: f32 = -3.0;
-/// What a place that is believed may have saved up, and when it is suspected: two searches in a row for another one.
+/// What a place that is believed may have saved up, and when it is suspected: two searches for another one, or one and a half
+/// loud ones.
 const SAVED: f32 = 1.0;
-const SUSPECTED: f32 = -2.9;
+const SUSPECTED: f32 = -1.9;
 
 /// What one search says of a place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,12 +37,18 @@ pub(crate) struct Opinion {
     pub(crate) explained: f32,
 }
 
+/// A place that was suspected is believed again when what is heard afresh speaks for it by so much, after so long at
+/// least, seconds: among furniture that no plan shows an audit errs once in some hours.
+const ACQUITTED: f32 = 0.5;
+const ACQUITTED_S: f64 = 6.0;
+
 /// The sum so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tally {
     log_odds: f32,
     /// Where it began, and where and when the last search was, in the trail's frame.
     from: Option<(f32, f32)>,
+    began_ns: Option<u64>,
     last: Option<(u64, f32, f32)>,
 }
 
@@ -63,6 +70,7 @@ impl Tally {
         let most = if believed { SAVED } else { f32::INFINITY };
         self.log_odds = (self.log_odds + anew.min(1.0) * says).min(most);
         self.from.get_or_insert((here.x, here.y));
+        self.began_ns.get_or_insert(now);
         self.last = Some((now, here.x, here.y));
     }
 
@@ -75,6 +83,11 @@ impl Tally {
     /// Whether a place that was found is another one.
     pub(crate) fn is_refuted(&self) -> bool {
         self.log_odds <= REFUTED
+    }
+
+    /// Whether a place that was suspected is the one after all.
+    pub(crate) fn is_acquitted(&self, now: u64) -> bool {
+        self.log_odds >= ACQUITTED && self.began_ns.is_some_and(|began| seconds(began, now) >= ACQUITTED_S)
     }
 
     /// Whether a place that is believed may be another one.
@@ -126,6 +139,17 @@ mod tests {
             tally.add(6 * k * S, &at(0.0), AGAINST, true);
         }
         assert!(tally.is_suspected());
+    }
+
+    #[test]
+    fn what_is_heard_afresh_acquits_and_not_at_once() {
+        let mut tally = Tally::default();
+        tally.add(S, &at(0.0), FOR, false);
+        assert!(!tally.is_acquitted(6 * S) && tally.is_acquitted(7 * S));
+        for k in 1..9 {
+            tally.add(k * 2 * S, &at(0.0), AGAINST, false);
+        }
+        assert!(!tally.is_acquitted(30 * S) && !Tally::default().is_acquitted(30 * S));
     }
 
     #[test]

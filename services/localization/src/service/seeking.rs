@@ -17,8 +17,8 @@ const FOUND_RAD: f32 = 0.12;
 const FOUND_DOUBT: f32 = 0.03;
 /// Until it was checked a place that was found is doubted this much at least.
 const UNCHECKED_DOUBT: f32 = 0.02;
-/// And one that was not confirmed in time is none to fly by.
-const UNCONFIRMED_DOUBT: f32 = 0.3;
+/// And one that was refuted or is suspected is none to fly by.
+const SUSPECTED_DOUBT: f32 = 0.3;
 /// A search that finds the place this near to where the set has it confirms it, metres.
 const FOUND_AGAIN_M: f32 = 0.7;
 /// A hypothesis among others is drawn as wide as the lattice, metres and radians.
@@ -154,7 +154,7 @@ impl Localization {
         start.p_lost = found.doubt.max(FOUND_DOUBT);
         let mut generator = Generator::new(self.seed ^ self.sent);
         // What is heard from now on has had no part in the finding.
-        (self.elsewhere, self.unconfirmed, self.doubted) = (0.0, false, 0.0);
+        (self.elsewhere, self.suspected, self.doubted) = (0.0, false, 0.0);
         self.seek.begin(Why::Check, heading_offset);
         let update = self.filter.start_at(&start, crate::set::columns_mut(&mut loan), &mut generator);
         self.believed = Some(self.send(now, time_ns, &update, &generator, loan));
@@ -166,7 +166,7 @@ impl Localization {
         // The thesis's filter is flown as it is, to be compared.
         if self.grounded || self.plain.is_some() {
             self.seek.stop();
-            (self.elsewhere, self.unconfirmed, self.kept_why) = (0.0, false, None);
+            (self.elsewhere, self.suspected, self.kept_why) = (0.0, false, None);
             return;
         }
         match self.seek.why() {
@@ -176,10 +176,14 @@ impl Localization {
             },
             Some(Why::Audit) if e.p_lost >= DOUBT_BEGINS => self.seek.begin(Why::Lost, e.heading_offset),
             Some(Why::Check | Why::Audit) if self.seek.is_refuted() => {
-                self.unconfirmed = true;
+                self.suspected = true;
                 self.seek.begin(Why::Lost, e.heading_offset);
             }
-            Some(Why::Lost) if !self.unconfirmed && e.p_lost < DOUBT_ENDS => self.seek.begin(Why::Audit, 0.0),
+            Some(Why::Lost) if self.suspected && e.p_lost < DOUBT_ENDS && self.seek.is_acquitted(now) => {
+                self.suspected = false;
+                self.seek.begin(Why::Audit, 0.0);
+            }
+            Some(Why::Lost) if !self.suspected && e.p_lost < DOUBT_ENDS => self.seek.begin(Why::Audit, 0.0),
             Some(_) => {}
         }
         let here = if self.seek.why() == Some(Why::Audit) {
@@ -207,8 +211,8 @@ impl Localization {
     /// The least that is to be doubted beside what the set doubts itself: a place that was found and is not checked yet,
     /// and one beside which another explains the last metres better.
     pub(super) fn least_doubt(&self) -> f32 {
-        if self.unconfirmed {
-            return UNCONFIRMED_DOUBT;
+        if self.suspected {
+            return SUSPECTED_DOUBT;
         }
         let unsure = self.seeking() == Seeking::Unchecked || self.elsewhere > 0.5;
         if unsure { UNCHECKED_DOUBT } else { 0.0 }
@@ -218,7 +222,7 @@ impl Localization {
     pub(super) fn seeking(&self) -> Seeking {
         match self.seek.why().or(self.kept_why) {
             Some(Why::Start) => Seeking::Hypotheses,
-            _ if self.unconfirmed => Seeking::Unconfirmed,
+            _ if self.suspected => Seeking::Suspected,
             Some(Why::Check) => Seeking::Unchecked,
             _ => Seeking::No,
         }
