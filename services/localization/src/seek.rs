@@ -215,9 +215,16 @@ impl Seek {
         [this, Opinion { share: other.share.min(1.0 - this.share), ..other }]
     }
 
-    pub(crate) fn hear(&mut self, time_ns: u64, here: &TrailPose, readings: &[Reading]) {
-        self.trail.push(seconds(0, time_ns), here, readings);
-        self.fresh = self.fresh.saturating_add(readings.len() as u32);
+    /// Takes the readings of one group. Of those that are `explained` (bit i: reading i) by what stands on no plan an
+    /// audit wants to know nothing: among furniture every other place fits better here and there.
+    pub(crate) fn hear(&mut self, time_ns: u64, here: &TrailPose, readings: &[Reading], explained: u32) {
+        let audits = self.why == Some(Why::Audit);
+        for (i, reading) in readings.iter().enumerate() {
+            if !audits || explained >> i & 1 == 0 {
+                self.trail.push(seconds(0, time_ns), here, core::slice::from_ref(reading));
+                self.fresh = self.fresh.saturating_add(1);
+            }
+        }
     }
 
     /// The hypotheses of the last search as they are at `here`: x, y, turn and share.

@@ -26,7 +26,7 @@ const REFUTED: f32 = -3.0;
 /// What a place that is believed may have saved up, and when it is suspected: two searches for another one, or one and a half
 /// loud ones.
 const SAVED: f32 = 1.0;
-const SUSPECTED: f32 = -1.9;
+const SUSPECTED: f32 = -2.9;
 
 /// What one search says of a place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

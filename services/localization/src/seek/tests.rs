@@ -54,7 +54,7 @@ fn look(within: Option<usize>) -> (Option<Found>, (f32, f32, f32)) {
         // In its own frame it flies along x and turns to and fro.
         let here = TrailPose { x: 0.02 * step as f32, y: 0.0, heading_rad: (step as f32 * 0.2).sin() };
         truth = (x0 + here.x * turn.cos(), y0 + here.x * turn.sin(), turn);
-        seek.hear(1, &here, &sweep(&table, truth.0, truth.1, here.heading_rad + turn));
+        seek.hear(1, &here, &sweep(&table, truth.0, truth.1, here.heading_rad + turn), 0);
         for slice in 0..40 {
             let now = (step * 40 + slice) * 5_000_000;
             if let (_, Some(found)) = seek.work(&table, now, &here, None) {
@@ -84,7 +84,7 @@ fn who_hears_one_side_only_or_nothing_new_does_not_search() {
     seek.begin(Why::Start, 0.0);
     let here = TrailPose::default();
     for _ in 0..100 {
-        seek.hear(1, &here, &sweep(&table, 1.5, 1.2, 0.0)[..2]);
+        seek.hear(1, &here, &sweep(&table, 1.5, 1.2, 0.0)[..2], 0);
         assert_eq!(seek.work(&table, 1, &here, None), (false, None));
     }
     assert_eq!(seek.share(), 0.0);

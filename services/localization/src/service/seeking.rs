@@ -84,7 +84,7 @@ impl Localization {
         };
         if let Some(group) = group.filter(|_| !self.grounded) {
             let here = self.trail_pose(time_ns);
-            self.seek.hear(time_ns, &here, group.readings());
+            self.seek.hear(time_ns, &here, group.readings(), 0);
         }
         let [x, y] = self.velocity.place_now();
         let [velocity_x, velocity_y] = self.velocity.velocity_now();
@@ -161,7 +161,7 @@ impl Localization {
     }
 
     /// Looks for another place while the set doubts itself, or has only just been found.
-    pub(super) fn watch(&mut self, now: u64, group: &Group, believed: &Believed) {
+    pub(super) fn watch(&mut self, now: u64, group: &Group, explained: u32, believed: &Believed) {
         let e = &believed.estimate;
         // The thesis's filter is flown as it is, to be compared.
         if self.grounded || self.plain.is_some() {
@@ -193,7 +193,7 @@ impl Localization {
         } else {
             self.trail_pose(believed.time_ns)
         };
-        self.seek.hear(believed.time_ns, &here, group.readings());
+        self.seek.hear(believed.time_ns, &here, group.readings(), explained);
         let suspect = (e.x, e.y, wrap_angle(e.heading_offset - self.seek.offset_rad));
         let (ended, found) = self.seek.work(&self.table, now, &here, Some(suspect));
         if ended {

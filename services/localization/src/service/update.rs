@@ -184,7 +184,7 @@ impl Localization {
         }
         self.believed = Some(believed);
         if let Some(group) = group {
-            self.watch(now, group, &believed);
+            self.watch(now, group, familiar | doors, &believed);
         }
     }
 
