@@ -33,8 +33,9 @@ const AGREED_LOST_S: f64 = 5.0;
 /// where it was, metres, needs so much better readings.
 const NEAR_BY_M: f32 = 4.0;
 const FAR_SHARE: f32 = 0.1;
-/// A check needs so many readings.
+/// A check needs so many readings, and an audit, which leaves out furniture.
 const CHECK_READINGS: usize = 60;
+const AUDIT_READINGS: usize = 36;
 /// And of which the place explains so much of what was heard: among clutter and behind a door that is shut the true one
 /// explains 56 to 90 % (22 flights of the demo building, full clutter).
 const EXPLAINED: f32 = 0.45;
@@ -242,10 +243,10 @@ impl Seek {
         suspect: Option<(f32, f32, f32)>,
     ) -> (bool, Option<Found>) {
         if !self.search.is_running() {
-            let least = if matches!(self.why, Some(Why::Check | Why::Audit)) {
-                CHECK_READINGS
-            } else {
-                LEAST_READINGS
+            let least = match self.why {
+                Some(Why::Check) => CHECK_READINGS,
+                Some(Why::Audit) => AUDIT_READINGS,
+                _ => LEAST_READINGS,
             };
             let enough = self.trail.len() >= least && self.trail.around() >= LEAST_AROUND;
             let rests =
