@@ -7,6 +7,7 @@ use crate::frame::MAX_FRAME;
 use crate::ladder::{Decision, Ladder};
 use crate::link::Link;
 use crate::outbox::Outbox;
+use crate::plausible::Batteries;
 use crate::stick::StickLaw;
 use crate::wish::{AUX_ARM, HIGH_US, LOW_US, Wish, neutral};
 use crate::words::write_blocks;
@@ -34,6 +35,7 @@ const JUNK_BYTES: u32 = 64;
 pub struct Core {
     config: Config,
     cells: u32,
+    batteries: Batteries,
     link: Link,
     ladder: Ladder,
     switch: ArmSwitch,
@@ -58,6 +60,7 @@ impl Core {
         Self {
             config: *config,
             cells,
+            batteries: Batteries::default(),
             link: Link::new(0, config.msp_version),
             ladder: Ladder::new(config),
             switch: ArmSwitch::default(),
@@ -236,7 +239,7 @@ impl Core {
 
     /// The newest reading of the battery, once.
     pub fn take_power(&mut self) -> Option<Power> {
-        let analog = self.link.said.analog.take()?;
+        let analog = self.link.said.analog.take().filter(|analog| self.batteries.judge(analog))?;
         // A controller without a voltage meter says zero.
         let volts = Some(analog.volts()).filter(|volts| *volts > 0.5).unwrap_or(f32::NAN);
         Some(Power {

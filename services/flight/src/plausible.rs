@@ -1,9 +1,9 @@
-//! Whether an attitude can be the aircraft's.
+//! Whether an attitude can be the aircraft's, and a reading its battery's.
 //!
 //! A check byte of eight bits lets one damaged frame in 256 pass, and version 1's XOR every pair of flipped bits that
 //! stand at the same place of two bytes: on a bad line that is an attitude of nobody every half a minute.
 
-use msp::messages::AttitudeReply;
+use msp::messages::{AnalogReply, AttitudeReply};
 
 /// Faster the aircraft does not turn, degrees a second: twice what full sticks ask for at default rates.
 const FASTEST: f32 = 400.0;
@@ -66,6 +66,39 @@ impl Attitudes {
     }
 }
 
+/// What two readings of the battery may differ by, volts, amperes and mAh: full throttle sags a pack by a volt, draws 20 A
+/// more than a hover, and 30 mAh in the time of a few answers that are lost.
+const SAGS_V: f32 = 1.5;
+const DRAWS_CENTIAMPS: u16 = 2_000;
+const DRAWS_MAH: u16 = 100;
+
+/// Compares each reading of the battery with the one before: one that is nobody's would send the drone home, and nothing
+/// fills a battery in flight. One that is too far off is held back, and believed when the next one agrees with it: a cell
+/// that is lost is seen half a second later.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Batteries {
+    believed: Option<AnalogReply>,
+    doubted: Option<AnalogReply>,
+}
+
+impl Batteries {
+    pub(crate) fn judge(&mut self, reply: &AnalogReply) -> bool {
+        let follows = |before: &AnalogReply| {
+            (before.volts() - reply.volts()).abs() <= SAGS_V
+                && before.centiamps.abs_diff(reply.centiamps) <= DRAWS_CENTIAMPS
+                && before.drawn_mah.abs_diff(reply.drawn_mah) <= DRAWS_MAH
+        };
+        let believe =
+            self.believed.as_ref().is_none_or(follows) || self.doubted.as_ref().is_some_and(follows);
+        if believe {
+            (self.believed, self.doubted) = (Some(*reply), None);
+        } else {
+            self.doubted = Some(*reply);
+        }
+        believe
+    }
+}
+
 /// Whether one can become the other in this time.
 fn near(passed_ns: u64, from: &AttitudeReply, to: &AttitudeReply) -> bool {
     let most = FASTEST * passed_ns as f32 * 1e-9 + MARGIN;
@@ -102,6 +135,28 @@ mod tests {
         assert!(!plausible.judge(132 * MS, reply(110, 20, 90)));
         assert!(plausible.judge(165 * MS, reply(110, 20, 92)), "it has been turned");
         assert!(plausible.judge(700 * MS, reply(-900, 20, 92)), "nothing is known of where it was");
+    }
+
+    #[test]
+    fn one_reading_of_nobodys_battery_is_held_back_and_a_lost_cell_is_not() {
+        let reading = |decivolts: u8, drawn_mah: u16| AnalogReply {
+            decivolts,
+            drawn_mah,
+            rssi: 0,
+            centiamps: 900,
+            centivolts: None,
+        };
+        let mut batteries = Batteries::default();
+        assert!(batteries.judge(&reading(162, 400)) && batteries.judge(&reading(150, 404)));
+        assert!(!batteries.judge(&reading(150, 33_172)), "a bit that flipped");
+        let gushing = AnalogReply { centiamps: 25_860, ..reading(150, 406) };
+        assert!(!batteries.judge(&gushing), "and the sign of another");
+        assert!(batteries.judge(&reading(151, 408)), "it was nobody's");
+        assert!(!batteries.judge(&reading(22, 410)));
+        assert!(batteries.judge(&reading(151, 412)));
+        assert!(!batteries.judge(&reading(112, 416)));
+        assert!(batteries.judge(&reading(111, 420)), "a cell is gone");
+        assert!(batteries.judge(&reading(110, 424)));
     }
 
     #[test]

@@ -70,10 +70,11 @@ pub struct ShieldConfig {
     pub grid_stands: u8,
     /// Room kept to the plan's walls beside the disc and the pose's sigma, metres: the plan is 3 cm wrong.
     pub plan_margin_m: f32,
-    /// Speed at which the drone may still go where only a doubtful pose, and no echo, sees a wall, m/s.
+    /// Speed at which the drone may still go where only the plan sees a wall, and a cone that looks at it hears none, m/s.
     pub creep_m_s: f32,
-    /// Walls of the plan nearer to the disc and its plan margin than this are moved away from while the pose is sure,
-    /// metres: sonars hear no wall that they look at askance.
+    /// Walls of the plan nearer to the disc, its plan margin and the pose's sigma than this are moved away from while the
+    /// pose is sure, metres: sonars hear no wall that they look at askance. Where a sure pose sees a wall that the cone which
+    /// looks there does not hear, it is crept up to this near and no nearer.
     pub plan_near_m: f32,
     /// Room kept to no-fly zones beside the disc and the pose's sigma, metres. No echo says that they are not there.
     pub zone_margin_m: f32,
