@@ -1,9 +1,11 @@
 //! The shield over a drawn building and over arbitrary readings.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod anything;
+mod plan;
+
 use control::{Echo, Footing, GridView, Look, Shield, ShieldConfig, Surroundings, Vector, Wish};
 use floorplan::{DistanceField, Plan};
-use proptest::prelude::*;
 use std::f32::consts::{FRAC_PI_4, PI};
 
 const RADIUS: f32 = 0.225;
@@ -224,41 +226,6 @@ fn near_things_push_and_a_person_ahead_stops() {
     assert!(shield.braking().distance(ahead.x) <= 0.15 + MOUNT - RADIUS);
 }
 
-/// The lower wall of the room, 0.37 m from the disc's middle, and a way aslant towards it.
-#[test]
-fn the_plan_is_believed_where_no_cone_looks_at_its_wall() {
-    let plan = door();
-    let walls = DistanceField::new(&plan, 2.0);
-    let below = Vector::new(plan.origin().0 + 1.5, plan.origin().1 + 0.1 + 0.37);
-    let flown = |silent: Option<usize>, sigma_m: f32| {
-        let mut shield = eight();
-        for k in (0..8).filter(|k| Some(*k) != silent) {
-            shield.hear(k, Look { at_ns: 0, heading: 0.0, place: None, echo: Echo::Nothing });
-        }
-        // Rear right, within the cone of the sonar at 225 degrees.
-        let wish = Wish::to(Vector::along(235f32.to_radians()) * 0.4);
-        shield.guard(0, wish, &Footing { sigma_m, ..at(below) }, &among(&walls)).velocity
-    };
-    let (heard, silent) = (flown(None, 0.08), flown(Some(6), 0.08));
-    assert!(heard.y < -0.02, "it creeps towards a wall that a cone looks at and does not hear: {heard:?}");
-    assert!(silent.y > 0.0, "nobody looks at that wall, and it is kept off: {silent:?}");
-}
-
-/// What the plan shows is moved away from farther off, the less sure the place is, until it says nothing.
-#[test]
-fn a_wall_of_the_plan_is_kept_off_by_the_doubt_about_the_place() {
-    let plan = door();
-    let walls = DistanceField::new(&plan, 2.0);
-    let pushed = |gap: f32, sigma_m: f32| {
-        let place = Vector::new(plan.origin().0 + 1.5, plan.origin().1 + 0.1 + RADIUS + gap);
-        let footing = Footing { sigma_m, ..at(place) };
-        shield_at_rest().guard(0, to(0.0, 0.0), &footing, &among(&walls)).velocity.y
-    };
-    assert!(pushed(0.05, 0.03) > 0.05 && pushed(0.25, 0.03) < 1e-3);
-    assert!(pushed(0.18, 0.03) < 1e-3 && pushed(0.18, 0.15) > 0.05);
-    assert!(pushed(0.05, 0.3) < 1e-3, "who does not know where it is knows of no wall");
-}
-
 /// A face that is looked at askance loses every third ping; one that is gone is heard through three times.
 #[test]
 fn a_near_thing_outlives_two_lost_pings_and_not_three() {
@@ -395,65 +362,4 @@ fn every_number_of_the_shield_has_bounds_and_who_leaves_them_is_told() {
         }
     }
     assert!(ShieldConfig::default().validate().is_ok());
-}
-
-proptest! {
-    #[test]
-    fn what_is_let_through_can_always_be_stopped(
-        ranges in proptest::collection::vec(prop_oneof![Just(None), (0.03f32..4.0).prop_map(Some)], 8),
-        ages in proptest::collection::vec(0u64..900, 8),
-        heading in -PI..PI,
-        wish in (-2.0f32..2.0, -2.0f32..2.0),
-        flown in (-2.0f32..2.0, -2.0f32..2.0),
-        sweep in 0.1f32..1.0,
-        clearance_m in prop_oneof![Just(0.0f32), Just(1.0)],
-    ) {
-        let mut shield = eight();
-        shield.set_sweep(sweep);
-        let now = 10_000_000_000u64;
-        for (k, (range, age)) in ranges.iter().zip(&ages).enumerate() {
-            let echo = range.map_or(Echo::Nothing, Echo::Range);
-            shield.hear(k, Look { at_ns: now - age * 1_000_000, heading, place: None, echo });
-        }
-        let flown = Vector::new(flown.0, flown.1);
-        let footing = Footing { heading, velocity: flown, clearance_m, ..somewhere() };
-        let wish = Vector::new(wish.0, wish.1);
-        let v = shield.guard(now, Wish::to(wish), &footing, &Surroundings::default()).velocity;
-        let speed = v.norm();
-        // Push and brake at their most.
-        prop_assert!(speed <= wish.norm() + 0.71);
-        if speed > 1e-3 {
-            let free = shield.heard_way(now, v * (1.0 / speed), flown, RADIUS + 0.03);
-            prop_assert!(shield.braking().distance(speed) <= free + 1e-3, "{speed} in {free}");
-        }
-        if speed > 0.101 {
-            // Somebody looks there, and not long ago.
-            let looked = (0..8).any(|k| {
-                let off = control::wrap_angle(v.angle() - heading - k as f32 * FRAC_PI_4).abs();
-                off < 28.2f32.to_radians() && (ages[k] as f32) * 1e-3 <= 2.0 * sweep + 1e-3
-            });
-            prop_assert!(looked);
-        }
-    }
-
-    #[test]
-    fn nonsense_does_no_harm(bits in proptest::collection::vec(any::<u32>(), 12)) {
-        let f = |k: usize| f32::from_bits(bits[k]);
-        let mut shield = eight();
-        shield.set_sweep(f(0));
-        for k in 0..20 {
-            shield.hear(k, Look { at_ns: u64::from(bits[1]), heading: f(2), place: Vector::new(f(7), f(8)).known(), echo: Echo::Range(f(3 + k % 4)) });
-        }
-        let wish = Vector::new(f(10), f(11));
-        let footing = Footing {
-            place: Vector::new(f(7), f(8)).known(),
-            sigma_m: f(9),
-            heading: f(2),
-            velocity: wish,
-            clearance_m: f(6),
-        };
-        let walls = DistanceField::new(&door(), 2.0);
-        let v = shield.guard(u64::from(bits[1]), Wish::to(wish), &footing, &among(&walls)).velocity;
-        prop_assert!(v.is_finite());
-    }
 }
