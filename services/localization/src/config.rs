@@ -51,6 +51,8 @@ section! {
         heading_noise: f32,
         /// rad per √m.
         heading_noise_per_m: f32,
+        /// rad.
+        heading_spread: f32,
         /// rad per √s.
         level_noise: f32,
         /// 1/s.

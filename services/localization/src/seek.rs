@@ -99,7 +99,7 @@ pub(crate) struct Found {
 
 /// An audit looks this far around, metres, this far to either side of the heading, radians, and every so often, seconds: a
 /// set that slips along a corridor while somebody stands in the way does so by decimetres a minute, and unnoticed.
-const AUDIT_M: f32 = 4.0;
+const AUDIT_M: f32 = 3.0;
 const AUDIT_TURN_RAD: f32 = 0.25;
 const AUDIT_EVERY_S: f64 = 3.0;
 /// And hears the last seconds only: what was heard before speaks for the place that was left.
@@ -211,7 +211,12 @@ impl Seek {
                 explained: sum.explained.max(of.explained),
             })
         };
-        let this = of(at);
+        let mut this = of(at);
+        // Among things that no plan shows the readings may carry the place itself off to another one.
+        if let Some(itself) = self.search.suspect() {
+            this.share = this.share.max(itself.weight.min(1.0));
+            this.explained = this.explained.max(itself.explained);
+        }
         let other = other.map_or_else(Opinion::default, of);
         [this, Opinion { share: other.share.min(1.0 - this.share), ..other }]
     }

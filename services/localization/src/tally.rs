@@ -12,10 +12,15 @@ use mcl::TrailPose;
 const SAYS_MOST: f32 = 2.0;
 const SAYS_LEAST: f32 = 0.02;
 /// Another place speaks against this one if it explains more of what was heard: from this share on, with full voice at the
-/// second and half as loud again at most. Along a corridor the next door explains as much, and is likelier or not as it
-/// happens (shares of readings; 12 flights that were right: 0.08 at most, of displaced ones 0.08 to 0.45).
-const EXPLAINS_MORE: (f32, f32) = (0.04, 0.12);
+/// second and two and a half times as loud at most. Along a corridor the next door explains as much, and is likelier or not
+/// as it happens.
+const EXPLAINS_MORE: (f32, f32) = (0.02, 0.08);
 const LOUDEST: f32 = 2.5;
+/// And if it is one place: from this share of the belief on, with full voice at the second. Of forty places among equal
+/// pillars the best always explains more than the true one, and holds a third of the belief. (92 flights, three
+/// buildings: 11 576 audits of places that were right, of which 147 spoke against them when 0.04 more and no belief was asked
+/// for, and 50 now; of 70 audits of wrong places, 45 and 35.)
+const ALONE: (f32, f32) = (0.5, 0.9);
 /// A search counts wholly after so much of new way, metres, or so long, seconds.
 const ANEW_M: f32 = 2.0;
 const ANEW_S: f32 = 6.0;
@@ -63,8 +68,9 @@ impl Tally {
         let voice = if odds > 0.0 {
             1.0
         } else {
-            let (from, full) = EXPLAINS_MORE;
-            ((other.explained - this.explained - from) / (full - from)).clamp(0.0, LOUDEST)
+            let above = |(from, full): (f32, f32), what: f32| ((what - from) / (full - from)).max(0.0);
+            let more = above(EXPLAINS_MORE, other.explained - this.explained).min(LOUDEST);
+            more * above(ALONE, other.share).min(1.0)
         };
         let says = odds.clamp(-SAYS_MOST, SAYS_MOST) * voice;
         let most = if believed { SAVED } else { f32::INFINITY };
@@ -163,12 +169,18 @@ mod tests {
             tally.add(6 * k * S, &at(k as f32), AGAINST, true);
         }
         assert!(tally.is_suspected());
-        let next_door = [Opinion { explained: 0.8, ..AGAINST[0] }, AGAINST[1]];
+        let next_door = [Opinion { explained: 0.82, ..AGAINST[0] }, AGAINST[1]];
         let mut corridor = Tally::default();
         for k in 0..100 {
             corridor.add(6 * k * S, &at(k as f32), next_door, true);
         }
         assert!(!corridor.is_suspected(), "what explains as much is no better");
+        let pillars = [AGAINST[0], Opinion { share: 0.35, ..AGAINST[1] }];
+        let mut among = Tally::default();
+        for k in 0..100 {
+            among.add(6 * k * S, &at(k as f32), pillars, true);
+        }
+        assert!(!among.is_suspected(), "the best of many places is no other place");
         let mut found = Tally::default();
         for k in 0..2 {
             found.add(6 * k * S, &at(k as f32), AGAINST, false);

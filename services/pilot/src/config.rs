@@ -73,8 +73,10 @@ pub struct LandingConfig {
     pub slow_below_m: f32,
     /// Farthest from the place of landing at which it goes on down, metres.
     pub aside_m: f32,
-    /// Longest wait for coming so near, seconds.
+    /// Longest wait for coming so near, and longest way to where floor was seen, seconds.
     pub patience_s: f32,
+    /// Who cannot choose the place lands where floor was seen on the way, not farther than this, metres; 0: where it is.
+    pub farthest_floor_m: f32,
 }
 
 impl Default for PilotConfig {
@@ -111,7 +113,14 @@ impl Default for TakeOffConfig {
 
 impl Default for LandingConfig {
     fn default() -> Self {
-        Self { descent_m_s: 0.35, slow_m_s: 0.2, slow_below_m: 0.4, aside_m: 0.2, patience_s: 8.0 }
+        Self {
+            descent_m_s: 0.35,
+            slow_m_s: 0.2,
+            slow_below_m: 0.4,
+            aside_m: 0.2,
+            patience_s: 8.0,
+            farthest_floor_m: 2.0,
+        }
     }
 }
 
@@ -152,6 +161,7 @@ impl Validate for PilotConfig {
         within("landing.slow_below_m", f(self.landing.slow_below_m), 0.2..=0.8)?;
         within("landing.aside_m", f(self.landing.aside_m), 0.05..=0.5)?;
         within("landing.patience_s", f(self.landing.patience_s), 1.0..=30.0)?;
+        within("landing.farthest_floor_m", f(self.landing.farthest_floor_m), 0.0..=4.0)?;
         self.liftoff
             .validate()
             .and_then(|()| self.touch_down.validate())

@@ -5,8 +5,8 @@ use crate::config::PilotConfig;
 use crate::ground::Below;
 use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, UNSEEN_S, age_s};
 use control::{
-    ClimbController, Delay, Failsafe, Footing, HeightEstimator, Held, Judgement, Motion, Shield, SpoolUp,
-    Stage, Tilt, TouchDown, Vector, VelocityController, WayHome, wrap_angle,
+    ClimbController, Delay, Failsafe, FloorTrail, Footing, HeightEstimator, Held, Judgement, Motion, Shield,
+    SpoolUp, Stage, Tilt, TouchDown, Vector, VelocityController, WayHome, wrap_angle,
 };
 use floorplan::{DistanceField, Plan};
 use ipc_types::{ChannelSource, Phase, Text};
@@ -131,6 +131,7 @@ pub struct PilotCore {
     pub(crate) motion: Motion,
     pub(crate) velocity: VelocityController,
     pub(crate) below: Below,
+    pub(crate) floor: FloorTrail,
     pub(crate) shield: Shield,
     pub(crate) delay: Delay,
     pub(crate) spool: Option<SpoolUp>,
@@ -149,6 +150,8 @@ pub struct PilotCore {
     pub(crate) operator_land: bool,
     pub(crate) blind_since_ns: Option<u64>,
     pub(crate) aside_s: f32,
+    /// Where the floor was seen that a landing goes to first, in the floor trail's frame.
+    pub(crate) lands_at: Option<Vector>,
     /// Somebody else flies, or nobody sees the attitude: nothing is learned from what comes of the own channels.
     pub(crate) frozen: bool,
 
@@ -193,6 +196,7 @@ impl PilotCore {
             motion: Motion::new(config.motion),
             velocity: VelocityController::new(velocity, config.motion.drag_per_s),
             below: Below::new(craft.beam_rest_m),
+            floor: FloorTrail::new(craft.radius_m),
             shield: Shield::new(config.shield, craft.radius_m, craft.sides.iter().copied()),
             delay: Delay::default(),
             spool: None,
@@ -210,6 +214,7 @@ impl PilotCore {
             operator_land: false,
             blind_since_ns: None,
             aside_s: 0.0,
+            lands_at: None,
             frozen: false,
             disarmed: Held::default(),
             failsafe: Failsafe::default(),

@@ -72,11 +72,33 @@ impl PilotCore {
                 self.height.feel(now, lifted - self.ground.lifted - vertical);
             }
             self.height.predict(now, vertical);
+            self.remember_floor(now, dt);
         } else {
+            self.floor.forget();
             self.frozen = false;
             self.motion.predict(now, Vector::ZERO);
             self.height.set(now, 0.0, 0.0, 0.0);
         }
+    }
+
+    /// Remembers what was below along the way, in the compass's frame: it does not turn when the place is found anew.
+    fn remember_floor(&mut self, now: u64, dt: f32) {
+        if age_s(self.pose.at, now) >= RECKON_S {
+            self.floor.forget();
+            return;
+        }
+        let blind = self.height.silent_s(now) > self.config.failsafe.height_hold_s;
+        let level =
+            self.below.edge_m(now).map_or(self.height.surface_m(), |edge| edge.max(self.height.surface_m()));
+        let velocity = self.motion.velocity().rotated(-self.pose.heading_offset);
+        self.floor.go(dt, velocity, (!blind).then_some(level));
+    }
+
+    /// Whether the velocity may be flown by. Who is lost comes down level, but for the drift that the floor itself shows.
+    pub(crate) fn velocity_known(&self, now: u64) -> bool {
+        age_s(self.pose.at, now) < RECKON_S
+            && self.pose.velocity_sigma < MOST_VELOCITY_SIGMA
+            && (self.judged.action != Action::Descend || self.pose.velocity_sigma < SURE_VELOCITY)
     }
 
     /// What others fly teaches nothing. Who is followed again begins at the throttle that was flown, and what the height
@@ -155,6 +177,10 @@ impl PilotCore {
         if source != Source::Failsafe {
             self.looks_from = None;
         }
+        if let Some(place) = self.lands_at {
+            let way = self.floor.way_to(place).rotated(self.pose.heading_offset);
+            return (Wish::to(hold_velocity(&self.config.hold, way, Vector::ZERO)), source, expiry_ns);
+        }
         let wish = match self.hold {
             Some(hold) if place => Wish {
                 velocity: hold_velocity(&self.config.hold, hold, self.motion.place()),
@@ -188,11 +214,7 @@ impl PilotCore {
         self.delay.attitude(now, age_s(self.attitude.sampled, now));
         self.shield.set_delay(self.delay.more_s(now));
         let guarded = self.shield.guard(now, wish, &self.footing(), &plan);
-        // Who is lost comes down level, but for the drift that the floor itself shows.
-        let velocity_known = age_s(self.pose.at, now) < RECKON_S
-            && self.pose.velocity_sigma < MOST_VELOCITY_SIGMA
-            && (self.judged.action != Action::Descend || self.pose.velocity_sigma < SURE_VELOCITY);
-        let velocity = velocity_known.then(|| self.motion.velocity());
+        let velocity = self.velocity_known(now).then(|| self.motion.velocity());
         let trust = if self.frozen || age_s(self.pose.at, now) > FRESH_POSE_S {
             0.0
         } else {
@@ -255,7 +277,7 @@ impl PilotCore {
         let tilt = self.tilt().magnitude();
         let blind = self.height.silent_s(now) > c.failsafe.height_hold_s;
         let (wish, learn) = match self.phase {
-            Phase::Landing | Phase::EmergencyLanding => {
+            Phase::Landing | Phase::EmergencyLanding if self.lands_at.is_none() => {
                 let off = match self.hold {
                     Some(hold) if self.place_known() => (hold - self.motion.place()).norm(),
                     _ => 0.0,

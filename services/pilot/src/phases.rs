@@ -2,14 +2,14 @@
 
 use crate::core::{Decided, PilotCore};
 use crate::senses::age_s;
-use control::{Action, Liftoff, TouchDown, Vector};
+use control::{Action, Cause, Liftoff, TouchDown, Vector};
 use core::fmt::Write;
 use ipc_types::{LinkState, Phase, SetpointKind, Text};
 
 /// A controller that says so for this long did disarm, seconds: its status comes five times a second, and a
 /// restarted `flight` must have asked it first.
 const DISARMED_S: f32 = 1.0;
-/// The take-off is over when the height is this near, metres.
+/// The take-off is over when the height is this near, and the way to where it lands when the place is, metres.
 const THERE_M: f32 = 0.12;
 /// A climb that takes longer goes on as a hover, seconds.
 const CLIMB_S: f32 = 12.0;
@@ -46,11 +46,11 @@ impl PilotCore {
                     return;
                 }
                 Action::Land | Action::Descend
-                    if self.phase != Phase::EmergencyLanding
-                        && self.judged.cause != control::Cause::Operator =>
+                    if self.phase != Phase::EmergencyLanding && self.judged.cause != Cause::Operator =>
                 {
                     self.land(now, None);
                     self.enter(now, Phase::EmergencyLanding);
+                    self.lands_at = self.floor.nearest(self.config.landing.farthest_floor_m);
                     self.say_failsafe("emergency landing");
                 }
                 Action::Return => self.turn_home(now),
@@ -144,14 +144,40 @@ impl PilotCore {
         self.blind_since_ns = None;
         // In a hover the drone stands over its place already; out of a flight it lands where it stops.
         self.hold = place.or(if self.phase == Phase::Hover { self.hold } else { None });
+        self.lands_at = self
+            .floor
+            .nearest(self.config.landing.farthest_floor_m)
+            .filter(|_| place.is_none() && self.floor.stands_over_something());
         self.enter(now, Phase::Landing);
     }
 
+    /// Whether a landing still goes to where the floor was seen: for as long as it is heard what is below and beside and known
+    /// how fast it goes, and not for ever.
+    fn goes_aside(&mut self, now: u64, blind: bool) -> bool {
+        let blind = blind || self.judged.causes & Cause::AllSonarsSilent.bit() != 0;
+        let Some(place) = self.lands_at else { return false };
+        let there = self.floor.way_to(place).norm() < THERE_M;
+        if there && self.floor.stands_over_something() {
+            // The way erred, or the edge was not seen: there may be another place.
+            self.lands_at = self.floor.nearest(self.config.landing.farthest_floor_m);
+        }
+        let there = there && self.lands_at == Some(place);
+        if there || blind || !self.velocity_known(now) || self.phase_s(now) > self.config.landing.patience_s {
+            self.lands_at = None;
+        } else {
+            self.hold = None;
+        }
+        self.lands_at.is_some()
+    }
+
     fn landing(&mut self, now: u64, dt: f32) {
+        let blind = self.height.silent_s(now) > self.config.failsafe.height_hold_s;
+        if self.goes_aside(now, blind) {
+            return;
+        }
         self.settle();
         let (clearance, climb, load) =
             (self.height.clearance_m(), self.height.climb_m_s(), self.climb.load());
-        let blind = self.height.silent_s(now) > self.config.failsafe.height_hold_s;
         if blind {
             let since = *self.blind_since_ns.get_or_insert(now);
             let reckoned = clearance.max(0.0) / BLIND_M_S + BLIND_MORE_S;

@@ -12,6 +12,7 @@ mod check;
 mod climb;
 mod doubts;
 mod failsafe;
+mod floor_trail;
 mod heading;
 mod height;
 mod held;
@@ -32,6 +33,7 @@ pub use failsafe::{
     Action, Cause, Clears, Condition, Evidence, Failsafe, Flags, Judgement, Loss, Memory, OperatorLost,
     Policy, Row, Stage, TABLE, TakeOver, judge, page as failsafe_page,
 };
+pub use floor_trail::FloorTrail;
 pub use heading::{HeadingConfig, yaw_rate};
 pub use height::{Echo as HeightEcho, HeightConfig, HeightEstimator};
 pub use held::Held;

@@ -18,6 +18,11 @@ pub(crate) const BLOCK: usize = 256;
 /// Weights below this are nothing: subnormal numbers are slow.
 const NOTHING: f32 = 1e-30;
 
+/// The mean of the heading offset is followed this slowly, seconds of being sure of the place: a round past several of the
+/// things that turn a compass.
+const HEADING_MEAN_S: f32 = 120.0;
+const SURE: f32 = 0.05;
+
 /// The slow quantities that must survive a restart along with the set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory {
@@ -27,6 +32,8 @@ pub struct Memory {
     pub effective: f32,
     /// Particles wanted in the next set.
     pub wanted: f32,
+    /// What the heading offset wanders about, radians; `None` while nothing is known of it.
+    pub heading_mean: Option<f32>,
 }
 
 impl Memory {
@@ -35,6 +42,7 @@ impl Memory {
     pub fn to_array(&self) -> [f32; 16] {
         let mut out = [0.0; 16];
         [out[0], out[1], out[2]] = [self.p_lost, self.effective, self.wanted];
+        out[3] = self.heading_mean.unwrap_or(f32::NAN);
         out
     }
 
@@ -46,6 +54,7 @@ impl Memory {
             p_lost: sane(array[0], 0.5).min(1.0),
             effective: sane(array[1], 0.0),
             wanted: sane(array[2], 0.0),
+            heading_mean: Some(array[3]).filter(|mean| mean.abs() <= core::f32::consts::PI),
         }
     }
 }
@@ -141,7 +150,9 @@ impl<M: RangeMap> Filter<M> {
         let mut lanes = Lanes::new(generator);
         self.draw(start, &mut next, 0, count, &mut lanes);
         next.weight[..count].fill(1.0 / count as f32);
-        self.begin(count, start.p_lost, &next)
+        let mut update = self.begin(count, start.p_lost, &next);
+        update.memory.heading_mean = Some(crate::wrap_angle(start.heading_offset));
+        update
     }
 
     /// Writes a set around places of which each may be the one, with the share of the belief that it has.
@@ -202,6 +213,7 @@ impl<M: RangeMap> Filter<M> {
             p_lost: p_lost.clamp(0.0, 1.0),
             effective: estimate.effective,
             wanted: self.wanted(&estimate, spread),
+            heading_mean: None,
         };
         Update { count, estimate, memory, resampled: false, fits: 0, short: 0 }
     }
@@ -231,7 +243,9 @@ impl<M: RangeMap> Filter<M> {
         // While the set does not fit, it searches wider: up to four times the roughening, from a doubt
         // of 0.2 up.
         let widen = 1.0 + 3.0 * ((memory.p_lost - 0.2) / 0.6).clamp(0.0, 1.0);
-        let step = Step::new(&self.config.motion, motion, widen);
+        // And with any heading: what it took for the mean may be wrong as well.
+        let heading_mean = memory.heading_mean.filter(|_| widen <= 1.0);
+        let step = Step::new(&self.config.motion, motion, widen, heading_mean);
         let sweep = sweep.filter(|_| !motion.grounded);
         if let Some(sweep) = sweep {
             self.beams.prepare(sweep);
@@ -287,8 +301,13 @@ impl<M: RangeMap> Filter<M> {
             self.config.trust.step(memory.p_lost, motion.dt_s, 1.0, core::iter::empty())
         };
         let estimate = estimate.doubted(doubt);
-        let memory =
-            Memory { p_lost: doubt, effective: estimate.effective, wanted: self.wanted(&estimate, spread) };
+        let heading_mean = memory.heading_mean.map(|mean| {
+            let sure = !motion.grounded && doubt < SURE;
+            let share = if sure { (motion.dt_s / HEADING_MEAN_S).clamp(0.0, 1.0) } else { 0.0 };
+            crate::wrap_angle(mean + share * crate::wrap_angle(estimate.heading_offset - mean))
+        });
+        let wanted = self.wanted(&estimate, spread);
+        let memory = Memory { p_lost: doubt, effective: estimate.effective, wanted, heading_mean };
         let (fits, short) = sweep.map_or((0, 0), |s| self.fits(s, &estimate));
         Update { count, estimate, memory, resampled, fits, short }
     }

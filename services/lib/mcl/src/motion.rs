@@ -31,6 +31,11 @@ pub struct MotionConfig {
     pub heading_noise: f32,
     /// Random walk of the heading offset with distance, rad per √m: compass error that varies with place.
     pub heading_noise_per_m: f32,
+    /// Standard deviation of the heading offset about its mean, rad: how far apart two readings of a compass are that errs
+    /// by 20 degrees to either side (DESIGN 6). The walk is drawn back to the mean so much that it stays within this (Uhlenbeck and Ornstein
+    /// 1930): without it, a set that hears nothing in a wide hall turns by what no compass errs by, and finds walls that
+    /// fit.
+    pub heading_spread: f32,
     /// Random walk of the level error, rad per √s.
     pub level_noise: f32,
     /// Linear air drag over mass, 1/s.
@@ -51,6 +56,7 @@ impl Default for MotionConfig {
             distance_noise: 0.05,
             heading_noise: 0.02,
             heading_noise_per_m: 0.06,
+            heading_spread: 0.3,
             level_noise: 0.001,
             drag: 0.25,
             blind_acceleration: 0.8,
@@ -68,6 +74,7 @@ impl MotionConfig {
         within("motion.distance_noise", self.distance_noise, 0.0..=1.0)?;
         within("motion.heading_noise", self.heading_noise, 0.0..=1.0)?;
         within("motion.heading_noise_per_m", self.heading_noise_per_m, 0.0..=1.0)?;
+        within("motion.heading_spread", self.heading_spread, 0.02..=10.0)?;
         within("motion.level_noise", self.level_noise, 0.0..=0.1)?;
         within("motion.drag", self.drag, 0.0..=5.0)?;
         within("motion.blind_acceleration", self.blind_acceleration, 0.0..=10.0)?;
@@ -136,13 +143,16 @@ pub(crate) struct Step {
     distance_sigma: f32,
     heading_variance: f32,
     heading_variance_per_m_s: f32,
+    heading_mean: f32,
+    heading_pull: f32,
     level_sigma: f32,
     grounded: bool,
 }
 
 impl Step {
-    /// `widen` multiplies the wandering of place and heading while the set does not fit.
-    pub(crate) fn new(config: &MotionConfig, motion: &Motion, widen: f32) -> Self {
+    /// `widen` multiplies the wandering of place and heading while the set does not fit. `heading_mean`: what the heading
+    /// offset wanders about, where that is known.
+    pub(crate) fn new(config: &MotionConfig, motion: &Motion, widen: f32, heading_mean: Option<f32>) -> Self {
         let finite = |v: f32| if v.is_finite() { v } else { 0.0 };
         let dt = finite(motion.dt_s).clamp(0.0, LONGEST_S);
         let blind = finite(motion.blind_s).clamp(0.0, dt);
@@ -186,6 +196,8 @@ impl Step {
             distance_sigma: config.distance_noise,
             heading_variance: (config.heading_noise * widen).powi(2) * dt,
             heading_variance_per_m_s: config.heading_noise_per_m.powi(2) * dt,
+            heading_mean: heading_mean.unwrap_or(0.0),
+            heading_pull: heading_mean.map_or(0.0, |_| 0.5 / config.heading_spread.powi(2)),
             level_sigma: config.level_noise * root,
             grounded: motion.grounded,
         }
@@ -211,9 +223,12 @@ impl Step {
         let (lr, lp) = (&mut p.level_roll[..n], &mut p.level_pitch[..n]);
         for i in 0..n {
             let speed = (vx[i] * vx[i] + vy[i] * vy[i]).sqrt();
-            let heading_sigma = (self.heading_variance + self.heading_variance_per_m_s * speed).sqrt();
+            let heading_variance = self.heading_variance + self.heading_variance_per_m_s * speed;
+            let heading_sigma = heading_variance.sqrt();
             let position_sigma = (self.position_variance + self.position_variance_per_m_s * speed).sqrt();
-            let offset = wrap_angle(ho[i] + heading_sigma * n_heading[i]);
+            let back =
+                wrap_angle(ho[i] - self.heading_mean) * (self.heading_pull * heading_variance).min(1.0);
+            let offset = wrap_angle(ho[i] - back + heading_sigma * n_heading[i]);
             let level_roll = lr[i] + self.level_sigma * n_roll[i];
             let level_pitch = lp[i] + self.level_sigma * n_pitch[i];
             let (sin, cos) = sin_cos(self.yaw + offset);
@@ -265,7 +280,7 @@ mod tests {
             // Foretold and measured alike to a millimetre a second: what spreads is the place.
             let flow = Some(Flow { velocity_x: speed, velocity_y: 0.0, sigma: 0.001 });
             let motion = Motion { dt_s: 0.06, felt: Some([0.0; 2]), flow, ..Motion::default() };
-            let step = Step::new(&config, &motion, 1.0);
+            let step = Step::new(&config, &motion, 1.0, None);
             for _ in 0..50 {
                 for row in noise.iter_mut() {
                     lanes.fill_normal(row);
@@ -290,6 +305,50 @@ mod tests {
         let expected = [0.01 * 3.0f32.sqrt(), (0.01f32.powi(2) * 3.0 + 0.05f32.powi(2) * 1.2).sqrt()];
         assert!((stood / expected[0] - 1.0).abs() < 0.15, "{stood}");
         assert!((flew / expected[1] - 1.0).abs() < 0.15, "{flew} over 1.2 m");
+    }
+
+    /// N = 256 particles over an hour at half a metre a second; the standard error of a spread is 1 / √(2 · 256) = 4 %.
+    #[test]
+    fn the_heading_offset_wanders_as_far_as_compasses_err_and_no_farther() {
+        let config = MotionConfig::default();
+        let flow = Some(Flow { velocity_x: 0.5, velocity_y: 0.0, sigma: 0.001 });
+        let motion = Motion { dt_s: 0.06, felt: Some([0.0; 2]), flow, ..Motion::default() };
+        let spread = |mean: Option<f32>| {
+            let mut lanes = Lanes::new(&mut Generator::new(7));
+            let mut noise = Box::new([[0.0; BLOCK]; NOISE_ROWS]);
+            let mut columns = [[0.0; BLOCK]; 8];
+            let [x, y, heading_offset, velocity_x, velocity_y, level_roll, level_pitch, weight] =
+                &mut columns;
+            heading_offset.fill(3.0);
+            let step = Step::new(&config, &motion, 1.0, mean);
+            for _ in 0..60_000 {
+                for row in noise.iter_mut() {
+                    lanes.fill_normal(row);
+                }
+                velocity_x.fill(0.5);
+                velocity_y.fill(0.0);
+                weight.fill(1.0);
+                level_roll.fill(0.0);
+                level_pitch.fill(0.0);
+                let mut particles = ParticlesMut {
+                    x,
+                    y,
+                    heading_offset,
+                    velocity_x,
+                    velocity_y,
+                    level_roll,
+                    level_pitch,
+                    weight,
+                };
+                step.apply(&mut particles, &noise);
+            }
+            let about = |offset: &f32| wrap_angle(offset - 3.0).powi(2);
+            (heading_offset.iter().map(about).sum::<f32>() / BLOCK as f32).sqrt()
+        };
+        // About a mean beside the half turn, so that wrapping is asked for.
+        let held = spread(Some(3.0));
+        assert!((held / config.heading_spread - 1.0).abs() < 0.15, "{held}");
+        assert!(spread(None) > 1.5, "without a mean it is anywhere after an hour");
     }
 
     /// Equation 2 as printed, and as meant. N = 80 000, standard error of the mean 0.1 / √N = 0.0004.

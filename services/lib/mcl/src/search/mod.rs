@@ -49,6 +49,8 @@ const MODES: usize = 48;
 /// Two places are one when they are nearer than this, metres and radians.
 const APART_M: f32 = 0.5;
 const APART_RAD: f32 = 0.26;
+/// A place that is believed is off by so much at most: what the set and the way err by.
+const LEASH_M: f32 = 0.25;
 /// Steps in which a place is improved: metres and radians.
 const FINE: [(f32, f32); 3] = [(0.1, 0.04), (0.05, 0.02), (0.02, 0.01)];
 /// Rounds at most with each of them.
@@ -150,6 +152,8 @@ pub struct Search {
     sorted: Vec<Candidate>,
     modes: Vec<Mode>,
     hypotheses: Vec<Hypothesis>,
+    suspect: Option<Mode>,
+    weighed: Option<Hypothesis>,
 }
 
 impl Search {
@@ -173,6 +177,8 @@ impl Search {
             sorted: Vec::with_capacity(CANDIDATES + 1),
             modes: Vec::with_capacity(MODES + 1),
             hypotheses: Vec::with_capacity(MODES + 1),
+            suspect: None,
+            weighed: None,
         }
     }
 
@@ -192,6 +198,13 @@ impl Search {
     #[must_use]
     pub fn hypotheses(&self) -> &[Hypothesis] {
         &self.hypotheses
+    }
+
+    /// What the last search says of the place that it was given as a suspect, moved by [`LEASH_M`] at most: the readings
+    /// between two places must not carry the one over to the other.
+    #[must_use]
+    pub fn suspect(&self) -> Option<&Hypothesis> {
+        self.weighed.as_ref()
     }
 
     /// Begins a search: where is the drone that heard `trail` and is at `here` in its frame? `suspect`: a place and turn
@@ -219,9 +232,8 @@ impl Search {
         self.best.clear();
         self.glanced = f32::NEG_INFINITY;
         self.modes.clear();
-        if let Some((x, y, turn_rad)) = suspect {
-            self.modes.push(Mode { x, y, turn_rad, score: 0.0, explained: 0.0 });
-        }
+        self.suspect = suspect.map(|(x, y, turn_rad)| Mode { x, y, turn_rad, score: 0.0, explained: 0.0 });
+        self.modes.extend(self.suspect);
         self.stage = if self.heard.is_empty() { Stage::Idle } else { Stage::Lattice(0) };
     }
 
@@ -254,12 +266,19 @@ impl Search {
                     self.stage = Stage::Lattice(next + 1);
                 }
                 Stage::Improve(next) => {
-                    if next >= self.modes.len() {
+                    let Some(mode) = self.modes.get(next).copied() else {
                         self.weigh();
                         self.stage = Stage::Done;
                         return true;
+                    };
+                    if let Some(suspect) = self.suspect.filter(|_| next == 0) {
+                        let (suspect, asked) = self.improve(map, suspect, LEASH_M);
+                        self.suspect = Some(suspect);
+                        left -= (asked * self.heard.len()) as isize;
                     }
-                    left -= (self.improve(map, next) * self.heard.len()) as isize;
+                    let (improved, asked) = self.improve(map, mode, f32::INFINITY);
+                    self.modes[next] = improved;
+                    left -= (asked * self.heard.len()) as isize;
                     self.stage = Stage::Improve(next + 1);
                 }
             }
@@ -315,12 +334,12 @@ impl Search {
         }
     }
 
-    /// Moves a mode uphill; says how many places were asked.
-    fn improve<M: RangeMap>(&mut self, map: &M, index: usize) -> usize {
+    /// Moves a mode uphill, no farther than on a leash; says how many places were asked.
+    fn improve<M: RangeMap>(&mut self, map: &M, from: Mode, leash_m: f32) -> (Mode, usize) {
         let count = self.heard.len();
         let mut asked = 0;
         let mut turned = Columns::default();
-        let mut mode = self.modes[index];
+        let mut mode = from;
         let mut score = |mode: &Mode, asked: &mut usize| {
             *asked += 1;
             turned.turn(&self.columns, count, mode.turn_rad);
@@ -338,6 +357,9 @@ impl Search {
                             turn_rad: mode.turn_rad + sign * da * step_rad,
                             ..mode
                         };
+                        if (next.x - from.x).hypot(next.y - from.y) > leash_m {
+                            continue;
+                        }
                         next.score = score(&next, &mut asked);
                         if next.score > mode.score {
                             mode = next;
@@ -352,8 +374,7 @@ impl Search {
         }
         score(&mode, &mut asked);
         mode.explained = self.fine.explained(&self.sonar, &self.heard);
-        self.modes[index] = mode;
-        asked
+        (mode, asked)
     }
 
     /// The hypotheses from the modes: like ones are one, their weights sum to one.
@@ -361,19 +382,21 @@ impl Search {
         self.modes.sort_unstable_by(|a, b| b.score.total_cmp(&a.score));
         self.hypotheses.clear();
         let best = self.modes.first().map_or(0.0, |mode| mode.score);
+        let weighed = |mode: &Mode| Hypothesis {
+            x: mode.x,
+            y: mode.y,
+            turn_rad: wrap_angle(mode.turn_rad),
+            weight: (TEMPER * (mode.score - best)).exp(),
+            explained: mode.explained,
+        };
         for (i, mode) in self.modes.iter().enumerate() {
             if self.modes[..i].iter().all(|better| apart(better, mode)) {
-                self.hypotheses.push(Hypothesis {
-                    x: mode.x,
-                    y: mode.y,
-                    turn_rad: wrap_angle(mode.turn_rad),
-                    weight: (TEMPER * (mode.score - best)).exp(),
-                    explained: mode.explained,
-                });
+                self.hypotheses.push(weighed(mode));
             }
         }
+        self.weighed = self.suspect.as_ref().map(weighed);
         let sum: f32 = self.hypotheses.iter().map(|hypothesis| hypothesis.weight).sum();
-        for hypothesis in &mut self.hypotheses {
+        for hypothesis in self.hypotheses.iter_mut().chain(&mut self.weighed) {
             hypothesis.weight /= sum.max(f32::MIN_POSITIVE);
         }
     }

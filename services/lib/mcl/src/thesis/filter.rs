@@ -91,7 +91,8 @@ impl<M: RangeMap> Filter<M> {
 
     fn begun(&self, count: usize, next: PosesMut<'_>, p_lost: f32) -> Update {
         let estimate = summed_up(&next.first(count)).doubted(p_lost);
-        let memory = Memory { p_lost, effective: estimate.effective, wanted: count as f32 };
+        let memory =
+            Memory { p_lost, effective: estimate.effective, wanted: count as f32, heading_mean: None };
         Update { count, estimate, memory, resampled: false, fits: 0, short: 0 }
     }
 
@@ -148,7 +149,8 @@ impl<M: RangeMap> Filter<M> {
             update.count = population::resample(&self.config, next, generator, scratch, ancestors);
             update.resampled = true;
         }
-        update.memory = Memory { p_lost, effective: estimate.effective, wanted: update.count as f32 };
+        update.memory =
+            Memory { p_lost, effective: estimate.effective, wanted: update.count as f32, heading_mean: None };
         update
     }
 
