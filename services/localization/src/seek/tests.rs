@@ -89,3 +89,37 @@ fn who_hears_one_side_only_or_nothing_new_does_not_search() {
     }
     assert_eq!(seek.share(), 0.0);
 }
+
+/// What audits say of a place that is believed `off_m` beside the true one: whether it becomes suspected, and how far the
+/// search took it from where it was believed.
+fn audited(off_m: f32) -> (bool, f32) {
+    let plan = Arc::new(plan());
+    let table = ConeTable::new(Arc::clone(&plan), ConeModel::default()).unwrap();
+    let mut seek = Seek::new(Arc::new(Lattice::new(&plan, 0.25)), &SonarConfig::default(), None);
+    seek.begin(Why::Audit, 0.0);
+    let (x0, y0) = plan.origin();
+    let mut strayed = 0.0f32;
+    for step in 0..400u64 {
+        let now = step * 50_000_000;
+        let (x, y) = (x0 + 1.5 + 0.005 * step as f32, y0 + 1.2);
+        // The frame of an audit is the believed one.
+        let here = TrailPose { x: x + off_m, y, heading_rad: (step as f32 * 0.05).sin() };
+        seek.hear(now, &here, &sweep(&table, x, y, here.heading_rad), 0);
+        let (ended, _) = seek.work(&table, now, &here, Some((here.x, here.y, 0.0)));
+        if ended && let Some(of) = seek.search.suspect() {
+            let (sx, sy, _) = carried(of, &seek.search.origin(), &here);
+            strayed = strayed.max((sx - here.x).hypot(sy - here.y));
+        }
+        if seek.is_refuted() {
+            return (true, strayed);
+        }
+    }
+    (false, strayed)
+}
+
+#[test]
+fn an_audit_suspects_a_place_that_is_off_and_weighs_it_where_it_is() {
+    assert!(!audited(0.0).0);
+    let (suspected, strayed) = audited(0.9);
+    assert!(suspected && strayed < 0.3, "{strayed}");
+}

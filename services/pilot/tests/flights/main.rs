@@ -4,6 +4,7 @@
 mod alone;
 mod below;
 mod expiry;
+mod floor;
 mod home;
 mod kept;
 mod rig;
