@@ -95,6 +95,8 @@ struct Believed {
     time_ns: u64,
     estimate: Estimate,
     count: usize,
+    /// What the heading offset wanders about, as far as the filter knows.
+    heading_mean: Option<f32>,
 }
 
 impl Service for Localization {

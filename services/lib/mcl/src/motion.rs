@@ -31,8 +31,8 @@ pub struct MotionConfig {
     pub heading_noise: f32,
     /// Random walk of the heading offset with distance, rad per √m: compass error that varies with place.
     pub heading_noise_per_m: f32,
-    /// Standard deviation of the heading offset about its mean, rad: how far apart two readings of a compass are that errs
-    /// by 20 degrees to either side (DESIGN 6). The walk is drawn back to the mean so much that it stays within this (Uhlenbeck and Ornstein
+    /// Standard deviation of the heading offset about its mean, rad: a compass errs by 20 degrees at most (DESIGN 6), 0.2 on
+    /// average where all errors are as likely. The walk is drawn back to the mean so much that it stays within this (Uhlenbeck and Ornstein
     /// 1930): without it, a set that hears nothing in a wide hall turns by what no compass errs by, and finds walls that
     /// fit.
     pub heading_spread: f32,
@@ -56,7 +56,7 @@ impl Default for MotionConfig {
             distance_noise: 0.05,
             heading_noise: 0.02,
             heading_noise_per_m: 0.06,
-            heading_spread: 0.3,
+            heading_spread: 0.2,
             level_noise: 0.001,
             drag: 0.25,
             blind_acceleration: 0.8,

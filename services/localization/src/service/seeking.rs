@@ -108,7 +108,7 @@ impl Localization {
             p_lost: (1.0 - share).max(DOUBT_BEGINS),
             state: if share > 0.0 { State::Converging } else { State::Lost },
         };
-        self.believed = Some(Believed { time_ns, estimate, count: 0 });
+        self.believed = Some(Believed { time_ns, estimate, count: 0, heading_mean: None });
     }
 
     /// The middle of the plan: where a drone is drawn that may be anywhere.
@@ -163,6 +163,8 @@ impl Localization {
     /// Looks for another place while the set doubts itself, or has only just been found.
     pub(super) fn watch(&mut self, now: u64, group: &Group, explained: u32, believed: &Believed) {
         let e = &believed.estimate;
+        // A set that has lost its place may have turned with it; the compass has not.
+        let compass = believed.heading_mean.unwrap_or(e.heading_offset);
         // The thesis's filter is flown as it is, to be compared.
         if self.grounded || self.plain.is_some() {
             self.seek.stop();
@@ -171,13 +173,13 @@ impl Localization {
         }
         match self.seek.why() {
             None => match self.kept_why.take() {
-                Some(why) => self.seek.begin(why, e.heading_offset),
+                Some(why) => self.seek.begin(why, compass),
                 None => self.seek.begin(Why::Audit, 0.0),
             },
-            Some(Why::Audit) if e.p_lost >= DOUBT_BEGINS => self.seek.begin(Why::Lost, e.heading_offset),
+            Some(Why::Audit) if e.p_lost >= DOUBT_BEGINS => self.seek.begin(Why::Lost, compass),
             Some(Why::Check | Why::Audit) if self.seek.is_refuted() => {
                 self.suspected = true;
-                self.seek.begin(Why::Lost, e.heading_offset);
+                self.seek.begin(Why::Lost, compass);
             }
             Some(Why::Lost) if self.suspected && e.p_lost < DOUBT_ENDS && self.seek.is_acquitted(now) => {
                 self.suspected = false;

@@ -94,7 +94,12 @@ impl Localization {
         loan.send();
         self.sent += 1;
         self.sent_ns = now;
-        Believed { time_ns, estimate: update.estimate, count: update.count }
+        Believed {
+            time_ns,
+            estimate: update.estimate,
+            count: update.count,
+            heading_mean: update.memory.heading_mean,
+        }
     }
 
     /// Reads the last set, writes the next for `time_ns` into a fresh loan and sends it.
