@@ -21,10 +21,8 @@ impl Braking {
     /// The greatest speed that can still be stopped within `distance`; 0 for nothing or less.
     #[must_use]
     pub fn speed(&self, distance_m: f32) -> f32 {
-        if distance_m.is_nan() || distance_m <= 0.0 {
-            return 0.0;
-        }
         let (a, t) = (self.deceleration_m_s2, self.delay_s);
+        // Of a number and none `max` takes the number: a way that is none, or far behind, is no way.
         (a * ((t * t + 2.0 * distance_m / a).sqrt() - t)).max(0.0)
     }
 }
@@ -42,6 +40,14 @@ mod tests {
         {
             let braking = Braking { delay_s: sweep + 0.35, deceleration_m_s2: 2.0 };
             assert!((braking.distance(speed) - distance).abs() < 0.006, "{}", braking.distance(speed));
+        }
+    }
+
+    #[test]
+    fn no_way_is_no_speed() {
+        let braking = Braking { delay_s: 0.59, deceleration_m_s2: 2.0 };
+        for way in [0.0, -0.0, -1e-6, -0.3, -10.0, f32::NEG_INFINITY, f32::NAN] {
+            assert_eq!(braking.speed(way), 0.0, "{way} m");
         }
     }
 

@@ -74,6 +74,7 @@ mod tests {
         delay.ping(2 * S + S / 10, 0.09);
         let later = delay.more_s(3 * S);
         assert!(later > 0.15 && later < 0.25, "one in time does not make up for one that was late: {later}");
+        assert!((delay.more_s(3 * S + S / 2) - 0.15).abs() < 1e-5, "half of it in half of three seconds");
         assert_eq!(delay.more_s(6 * S), 0.0);
         delay.attitude(7 * S, f32::INFINITY);
         delay.attitude(7 * S, f32::NAN);

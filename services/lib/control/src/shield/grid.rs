@@ -97,4 +97,38 @@ mod tests {
         grid.see(1, Vector::ZERO, &GridView { cell_m: f32::NAN, ..view }, 5);
         assert_eq!(grid.points(2).count(), 0);
     }
+
+    #[test]
+    fn a_sector_is_five_degrees_and_holds_the_nearest_cell_within_a_metre() {
+        let points = |offs: &[(usize, usize)]| {
+            let mut cells = [0u8; 31 * 31];
+            for (x, y) in offs {
+                cells[(15 + y) * 31 + 15 + x] = 9;
+            }
+            let view = GridView { origin: Vector::new(-1.55, -1.55), cell_m: 0.1, side: 31, cells: &cells };
+            let mut grid = Grid::new();
+            grid.see(0, Vector::ZERO, &view, 5);
+            grid.points(0).collect::<Vec<_>>()
+        };
+        // Seen at 7.1, 9.5 and 11.3 degrees.
+        let one = points(&[(8, 1), (6, 1)]);
+        assert!(one.len() == 1 && (one[0] - Vector::new(0.6, 0.1)).norm() < 1e-3, "{one:?}");
+        assert_eq!(points(&[(6, 1), (5, 1)]).len(), 2);
+        assert_eq!((points(&[(9, 0), (0, 9)]).len(), points(&[(11, 0), (0, 11), (8, 8)]).len()), (2, 0));
+    }
+
+    #[test]
+    fn a_grid_that_cannot_be_holds_nothing() {
+        let cells = [9u8; 4];
+        let view = GridView { origin: Vector::new(-0.1, -0.1), cell_m: 0.1, side: 2, cells: &cells };
+        let points = |view: &GridView<'_>| {
+            let mut grid = Grid::new();
+            grid.see(0, Vector::ZERO, view, 5);
+            grid.points(0).count()
+        };
+        assert_eq!(points(&view), 4);
+        assert_eq!(points(&GridView { cell_m: 0.6, ..view }), 0, "so coarse is none");
+        assert_eq!(points(&GridView { side: 0, ..view }), 0);
+        assert_eq!(points(&GridView { origin: Vector::new(f32::NAN, 0.0), ..view }), 0);
+    }
 }

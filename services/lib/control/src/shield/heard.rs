@@ -121,8 +121,8 @@ impl Sensor {
             return None;
         };
         let rate = |(from_ns, from): (u64, f32), (to_ns, to): (u64, f32)| {
-            let dt = seconds(from_ns, to_ns);
-            let rate = if dt > 0.0 { (from - to) / dt } else { 0.0 };
+            // Two pings at one moment: endless or no number, and neither lies within.
+            let rate = (from - to) / seconds(from_ns, to_ns);
             (rate > 0.0 && rate < FASTEST_M_S).then_some(rate)
         };
         let recent = seconds(first.0, at_ns) < CLOSING_S;
@@ -282,7 +282,7 @@ fn way(walls: &DistanceField, from: Vector, axis: f32) -> Option<f32> {
         if distance < WALL_M {
             return Some(way);
         }
-        way += distance.max(0.5 * WALL_M);
+        way += distance;
     }
     None
 }
@@ -310,5 +310,63 @@ mod tests {
         assert_eq!(heard(&[Some(1.0), None, Some(0.8), Some(0.7)]), None, "not in a row");
         assert_eq!(heard(&[Some(0.8), Some(0.9), Some(0.8)]), None);
         assert_eq!(heard(&[Some(3.0), Some(0.9), Some(0.8)]), None, "another thing");
+        assert_eq!(heard(&[Some(0.8), Some(0.8), Some(0.8)]), None, "what stands does not come");
+    }
+
+    #[test]
+    fn pings_of_one_moment_and_pings_of_long_ago_say_nothing() {
+        let heard = |times_ms: [u64; 3]| {
+            let mut sensor = Sensor::new(0.0, Vector::ZERO);
+            for (at_ms, range) in times_ms.into_iter().zip([1.0, 0.9, 0.8]) {
+                sensor.take(Look { at_ns: at_ms * MS, heading: 0.0, place: None, echo: Echo::Range(range) });
+            }
+            sensor.closing()
+        };
+        assert!(heard([0, 350, 700]).is_some() && heard([0, 450, 900]).is_none());
+        assert!(heard([0, 0, 200]).is_none() && heard([0, 200, 200]).is_none());
+    }
+
+    /// A room of 4 m by 2 m, drawn at 1 cm, whose right wall begins at `face(y)`.
+    fn wall(face: impl Fn(f32) -> f32) -> DistanceField {
+        let middle = |k: usize| k as f32 * 0.01 + 0.005;
+        let cells: Vec<bool> = (0..400 * 200).map(|k| middle(k % 400) > face(middle(k / 400))).collect();
+        DistanceField::from_blocked(&cells, 400, 0.01, (0.0, 0.0), 2.0)
+    }
+
+    #[test]
+    fn a_wall_is_expected_as_far_away_as_it_is_seen_squarely() {
+        let walls = wall(|_| 2.0);
+        let expected =
+            |away: f32, degrees: f32| squarely(&walls, Vector::new(2.0 - away, 1.0), degrees.to_radians());
+        for away in [0.3, 0.8, 1.3] {
+            let way = expected(away, 0.0).unwrap_or(0.0);
+            assert!(way > away - WALL_M - 1e-3 && way < away + 1e-3, "{way} to what is {away} m away");
+        }
+        assert_eq!(expected(1.5, 0.0), None, "from too far away");
+        assert_eq!(expected(0.8, 180.0), None, "the other way");
+        // 15 degrees of incidence are the most that must answer (FACTS 2: up to 25 may).
+        assert!(expected(0.8, 13.0).is_some() && expected(0.8, -13.0).is_some());
+        assert!(expected(0.8, 17.0).is_none() && expected(0.8, -17.0).is_none());
+        // Coarse cells leave the field less steep at a face.
+        let cells: Vec<bool> = (0..40 * 20).map(|k| k % 40 >= 20).collect();
+        let coarse = DistanceField::from_blocked(&cells, 40, 0.1, (0.0, 0.0), 2.0);
+        assert!(squarely(&coarse, Vector::new(1.2, 1.0), 0.0).is_some());
+    }
+
+    /// The disc of sound at 8 degrees aside is 0.11 m from the axis at 0.8 m: there the wall must stand too, within 15 %.
+    #[test]
+    fn an_edge_and_a_jamb_are_not_expected() {
+        let face = Vector::new(1.2, 1.0);
+        for edge in [0.95, 1.05] {
+            let open = wall(|y| if (y < edge) == (edge < 1.0) { 3.0 } else { 2.0 });
+            assert_eq!(squarely(&open, face, 0.0), None, "nothing on one side of {edge}");
+        }
+        // The wall steps back beyond y = 1.05 m. A face 1.25 m away expects it while the step is below some 0.19 m.
+        let stepped = |back: f32| {
+            let walls = wall(|y| if y > 1.05 { 2.0 + back } else { 2.0 });
+            squarely(&walls, Vector::new(0.85, 1.0), 0.0)
+        };
+        let (low, high) = (stepped(0.13), stepped(0.24));
+        assert!(low.is_some() && high.is_none(), "{low:?}, {high:?}");
     }
 }

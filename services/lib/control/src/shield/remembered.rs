@@ -112,4 +112,75 @@ mod tests {
         memory.hear(S, here, here, 0.03, 2.0);
         assert_eq!(memory.things(S).count(), 0);
     }
+
+    /// A thing 0.8 m from a face that looks along `AXIS`, heard so often.
+    fn a_thing(times: u64) -> Remembered {
+        let mut memory = Remembered::new();
+        for k in 0..times {
+            memory.hear(k, FACE, FACE, AXIS, 0.8);
+        }
+        memory
+    }
+
+    const FACE: Vector = Vector::new(3.0, 2.0);
+    const AXIS: f32 = 2.0;
+
+    #[test]
+    fn what_is_heard_from_just_behind_a_thing_is_not_heard_through_it() {
+        // Five degrees aside, so that what is heard is another thing.
+        for (range, stays) in [(0.99, 1), (1.01, 0)] {
+            let mut memory = a_thing(2);
+            memory.hear(S, FACE, FACE, AXIS + 0.09, range);
+            assert_eq!(memory.things(S).count(), stays, "{range} m");
+        }
+    }
+
+    /// At its edge a face answers one ping and lets the next one pass.
+    #[test]
+    fn a_thing_is_gone_when_it_was_heard_through_as_often_as_it_was_heard_and_three_times_at_most() {
+        for (heard, outlives) in [(2, 0), (3, 1), (4, 2), (9, 2)] {
+            let mut memory = a_thing(heard);
+            for _ in 0..outlives {
+                memory.hear(S, FACE, FACE, AXIS, 2.5);
+            }
+            assert_eq!(memory.things(S).count(), 1, "heard {heard} times");
+            memory.hear(S, FACE, FACE, AXIS, 2.5);
+            assert_eq!(memory.things(S).count(), 0, "heard {heard} times");
+        }
+    }
+
+    #[test]
+    fn things_farther_than_0_2_m_from_each_other_are_two_and_beyond_1_5_m_none() {
+        // Two directions so far from each other, twice.
+        let heard = |turn: f32, range: f32| {
+            let mut memory = Remembered::new();
+            for axis in [AXIS, AXIS + turn, AXIS, AXIS + turn] {
+                memory.hear(0, FACE, FACE, axis, range);
+            }
+            memory.things(0).collect::<Vec<_>>()
+        };
+        let at = |turn: f32| FACE + Vector::along(AXIS + turn);
+        assert_eq!(heard(0.18, 1.0).len(), 1);
+        let two = heard(0.22, 1.0);
+        assert!(two.len() == 2 && (two[0] - at(0.0)).norm() < 1e-3 && (two[1] - at(0.22)).norm() < 1e-3);
+        assert!(heard(0.0, 1.55).is_empty());
+        let mut memory = Remembered::new();
+        for _ in 0..2 {
+            memory.hear(0, Vector::ZERO, Vector::ZERO, 0.0, NEAR_M);
+        }
+        assert_eq!(memory.things(0).count(), 1, "farther than this are not kept");
+    }
+
+    #[test]
+    fn the_oldest_thing_makes_room_when_there_are_too_many() {
+        let mut memory = Remembered::new();
+        for k in 0..=POINTS {
+            let face = Vector::new(k as f32 * 0.5, 0.0);
+            for _ in 0..2 {
+                memory.hear(0, face, face, core::f32::consts::FRAC_PI_2, 1.0);
+            }
+        }
+        assert_eq!(memory.things(0).count(), POINTS);
+        assert!(memory.things(0).all(|thing| thing.x > 0.4), "the first one is forgotten");
+    }
 }

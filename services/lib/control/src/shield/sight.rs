@@ -124,6 +124,9 @@ mod tests {
         assert_eq!(at(&ring, 110.1), Sight::Cone);
         assert_eq!(at(&ring, 18.0), Sight::Gap, "the gap on the other side of its neighbour stays one");
         assert_eq!(at(&[(0.0, false)], 0.0), Sight::Closed(None));
+        // One that looks the same way is no neighbour: nobody is beside it who could be silent.
+        let twins = [(0.0, true), (0.01, false)];
+        assert_eq!((at(&twins, 20.0), at(&twins, -20.0)), (Sight::Gap, Sight::Gap));
     }
 
     #[test]
@@ -138,5 +141,8 @@ mod tests {
                 && (age(10.0) - 1.5).abs() < 1e-6
         );
         assert!(age(16.0).is_infinite() && age(-18.0).is_infinite() && age(180.0).is_infinite());
+        // The cone covers -16 to 14 degrees; of what is told apart, -15 to 12 wholly.
+        assert!(age(-14.5).is_finite() && age(-15.5).is_infinite());
+        assert!(age(11.5).is_finite() && age(12.5).is_infinite());
     }
 }

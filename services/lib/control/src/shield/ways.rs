@@ -151,3 +151,22 @@ fn way_to(point: Vector, direction: Vector, wide: f32) -> f32 {
         f32::INFINITY
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::way_to;
+    use crate::planar::Vector;
+
+    /// A disc of 0.25 m that goes along x comes to touch at 0.6 m ahead, earlier or never by how far aside it is.
+    #[test]
+    fn a_point_is_touched_by_the_edge_and_passed_by_what_is_abreast_or_wide_of_it() {
+        let way = |x: f32, y: f32| way_to(Vector::new(x, y), Vector::new(1.0, 0.0), 0.25);
+        assert!((way(0.6, 0.0) - 0.35).abs() < 1e-6);
+        // The triangle of sides 3, 4 and 5: 0.15 m aside, the edge is 0.2 m ahead of the middle.
+        assert!((way(0.6, 0.15) - 0.4).abs() < 1e-6 && (way(0.6, -0.15) - 0.4).abs() < 1e-6);
+        assert_eq!(way(0.1, 0.1), 0.0, "within the disc already");
+        for (x, y) in [(0.6, 0.25), (0.6, -0.3), (0.0, 0.1), (-0.1, 0.0)] {
+            assert_eq!(way(x, y), f32::INFINITY, "{x}, {y} is passed");
+        }
+    }
+}

@@ -2,7 +2,12 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod anything;
+mod creep;
+mod listening;
 mod plan;
+mod retreat;
+mod trust;
+mod wishes;
 
 use control::{Echo, Footing, GridView, Look, Shield, ShieldConfig, Surroundings, Vector, Wish};
 use floorplan::{DistanceField, Plan};
@@ -10,13 +15,31 @@ use std::f32::consts::{FRAC_PI_4, PI};
 
 const RADIUS: f32 = 0.225;
 const MOUNT: f32 = 0.21;
+const MS: u64 = 1_000_000;
 
 fn eight() -> Shield {
+    eight_with(ShieldConfig::default())
+}
+
+fn eight_with(config: ShieldConfig) -> Shield {
     let sonars = (0..8).map(|k| {
         let bearing = k as f32 * FRAC_PI_4;
         (k, bearing, Vector::along(bearing) * MOUNT)
     });
-    Shield::new(ShieldConfig::default(), RADIUS, sonars)
+    Shield::new(config, RADIUS, sonars)
+}
+
+/// All eight ping at `now`: these hear something at this range, the others nothing.
+fn ping(shield: &mut Shield, now: u64, echoes: &[(usize, f32)]) {
+    for k in 0..8 {
+        let echo = echoes.iter().find(|echo| echo.0 == k).map_or(Echo::Nothing, |echo| Echo::Range(echo.1));
+        assert!(shield.hear(k, Look { at_ns: now, heading: 0.0, place: None, echo }));
+    }
+}
+
+/// Range of an echo that leaves this gap between the thing and the disc's edge, metres.
+fn range(gap: f32) -> f32 {
+    gap + RADIUS - MOUNT
 }
 
 fn at(place: Vector) -> Footing {
@@ -258,16 +281,15 @@ fn a_near_thing_outlives_two_lost_pings_and_not_three() {
 fn a_box_that_stopped_answering_is_still_there() {
     let mut shield = eight();
     let footing = at(Vector::ZERO);
-    let ms = 1_000_000;
     for turn in 0..2u64 {
         for k in 0..8 {
             let echo = if k == 0 { Echo::Range(0.4) } else { Echo::Nothing };
-            shield.hear(k, Look { at_ns: turn * 240 * ms, heading: 0.0, place: Some(Vector::ZERO), echo });
+            shield.hear(k, Look { at_ns: turn * 240 * MS, heading: 0.0, place: Some(Vector::ZERO), echo });
         }
     }
     // Turned by 20 degrees: the face sends the ping elsewhere.
     let footing = Footing { heading: 0.35, ..footing };
-    let now = 720 * ms;
+    let now = 720 * MS;
     for k in 0..8 {
         let look = Look { at_ns: now, heading: 0.35, place: Some(Vector::ZERO), echo: Echo::Nothing };
         shield.hear(k, look);
@@ -276,7 +298,7 @@ fn a_box_that_stopped_answering_is_still_there() {
     assert!(shield.braking().distance(left.velocity.x) <= 0.61 - RADIUS, "{:?}", left.velocity);
     let aside = shield.guard(now, to(0.0, 0.5), &footing, &Surroundings::default());
     assert!(aside.velocity.y > 0.45);
-    let later = shield.guard(now + 200 * ms, to(0.5, 0.0), &footing, &Surroundings::default());
+    let later = shield.guard(now + 200 * MS, to(0.5, 0.0), &footing, &Surroundings::default());
     assert!(later.velocity.x < 0.45);
 }
 
