@@ -13,6 +13,8 @@ const DISARMED_S: f32 = 1.0;
 const THERE_M: f32 = 0.12;
 /// A climb that takes longer goes on as a hover, seconds.
 const CLIMB_S: f32 = 12.0;
+/// Above floor and lower than this a landing goes on, metres: two seconds more.
+const LOW_M: f32 = 0.8;
 /// Blind descent: rate, and time beyond the reckoned one after which the skids must stand, seconds: with
 /// [`BLIND_SHORT`] it is down from 1.3 m by then, and lands at 0.6 m/s.
 pub(crate) const BLIND_M_S: f32 = 0.35;
@@ -50,7 +52,7 @@ impl PilotCore {
                 {
                     self.land(now, None);
                     self.enter(now, Phase::EmergencyLanding);
-                    self.lands_at = self.floor.nearest(self.config.landing.farthest_floor_m);
+                    self.lands_at = self.floor_to_land_on();
                     self.say_failsafe("emergency landing");
                 }
                 Action::Return => self.turn_home(now),
@@ -144,11 +146,15 @@ impl PilotCore {
         self.blind_since_ns = None;
         // In a hover the drone stands over its place already; out of a flight it lands where it stops.
         self.hold = place.or(if self.phase == Phase::Hover { self.hold } else { None });
-        self.lands_at = self
-            .floor
-            .nearest(self.config.landing.farthest_floor_m)
-            .filter(|_| place.is_none() && self.floor.stands_over_something());
+        let chosen = place.is_some() || !self.floor.stands_over_something();
+        self.lands_at = if chosen { None } else { self.floor_to_land_on() };
         self.enter(now, Phase::Landing);
+    }
+
+    /// Where to land when nobody chose the place; `None` is here. Who is low above the floor is not sent up again.
+    fn floor_to_land_on(&self) -> Option<Vector> {
+        let low = self.height.clearance_m() < LOW_M && !self.floor.stands_over_something();
+        self.floor.nearest(self.config.landing.farthest_floor_m).filter(|_| !low)
     }
 
     /// Whether a landing still goes to where the floor was seen: for as long as it is heard what is below and beside and known
@@ -159,7 +165,7 @@ impl PilotCore {
         let there = self.floor.way_to(place).norm() < THERE_M;
         if there && self.floor.stands_over_something() {
             // The way erred, or the edge was not seen: there may be another place.
-            self.lands_at = self.floor.nearest(self.config.landing.farthest_floor_m);
+            self.lands_at = self.floor_to_land_on();
         }
         let there = there && self.lands_at == Some(place);
         if there || blind || !self.velocity_known(now) || self.phase_s(now) > self.config.landing.patience_s {

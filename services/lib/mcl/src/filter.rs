@@ -6,6 +6,7 @@ use crate::estimate::{Estimate, Summary};
 use crate::generator::{Generator, Lanes};
 use crate::map::RangeMap;
 use crate::maths::sum;
+use crate::memory::Memory;
 use crate::motion::{Motion, NOISE_ROWS, Step};
 use crate::particles::{ParticlesMut, ParticlesRef};
 use crate::resample::draw_ancestors;
@@ -15,49 +16,10 @@ use crate::trust::Evidence;
 /// Particles are worked on in blocks of this many, so that what passes between the steps stays in the
 /// first-level cache.
 pub(crate) const BLOCK: usize = 256;
+/// Doubt up to which the heading tells what the compass errs by on average.
+const SURE: f32 = 0.05;
 /// Weights below this are nothing: subnormal numbers are slow.
 const NOTHING: f32 = 1e-30;
-
-/// The mean of the heading offset is followed this slowly, seconds of being sure of the place: a round past several of the
-/// things that turn a compass.
-const HEADING_MEAN_S: f32 = 120.0;
-const SURE: f32 = 0.05;
-
-/// The slow quantities that must survive a restart along with the set.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Memory {
-    /// Probability of being lost, 0..=1.
-    pub p_lost: f32,
-    /// Effective sample size of the set it goes with.
-    pub effective: f32,
-    /// Particles wanted in the next set.
-    pub wanted: f32,
-    /// What the heading offset wanders about, radians; `None` while nothing is known of it.
-    pub heading_mean: Option<f32>,
-}
-
-impl Memory {
-    /// For a message.
-    #[must_use]
-    pub fn to_array(&self) -> [f32; 16] {
-        let mut out = [0.0; 16];
-        [out[0], out[1], out[2]] = [self.p_lost, self.effective, self.wanted];
-        out[3] = self.heading_mean.unwrap_or(f32::NAN);
-        out
-    }
-
-    /// From a message; values that make no sense become doubtful ones.
-    #[must_use]
-    pub fn from_array(array: &[f32; 16]) -> Self {
-        let sane = |v: f32, otherwise: f32| if v.is_finite() && v >= 0.0 { v } else { otherwise };
-        Self {
-            p_lost: sane(array[0], 0.5).min(1.0),
-            effective: sane(array[1], 0.0),
-            wanted: sane(array[2], 0.0),
-            heading_mean: Some(array[3]).filter(|mean| mean.abs() <= core::f32::consts::PI),
-        }
-    }
-}
 
 /// A known place to start from, and how well it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -301,11 +263,8 @@ impl<M: RangeMap> Filter<M> {
             self.config.trust.step(memory.p_lost, motion.dt_s, 1.0, core::iter::empty())
         };
         let estimate = estimate.doubted(doubt);
-        let heading_mean = memory.heading_mean.map(|mean| {
-            let sure = !motion.grounded && doubt < SURE;
-            let share = if sure { (motion.dt_s / HEADING_MEAN_S).clamp(0.0, 1.0) } else { 0.0 };
-            crate::wrap_angle(mean + share * crate::wrap_angle(estimate.heading_offset - mean))
-        });
+        let sure_s = if motion.grounded || doubt >= SURE { 0.0 } else { motion.dt_s };
+        let heading_mean = memory.heading_mean_after(sure_s, estimate.heading_offset);
         let wanted = self.wanted(&estimate, spread);
         let memory = Memory { p_lost: doubt, effective: estimate.effective, wanted, heading_mean };
         let (fits, short) = sweep.map_or((0, 0), |s| self.fits(s, &estimate));

@@ -29,6 +29,7 @@ mod filter;
 mod generator;
 mod map;
 mod maths;
+mod memory;
 mod motion;
 mod particles;
 mod resample;
@@ -39,7 +40,8 @@ mod trust;
 
 pub use config::{Config, ConfigError, PopulationConfig, ResampleConfig, SonarConfig};
 pub use estimate::{Estimate, State};
-pub use filter::{Filter, Memory, Start, Update};
+pub use filter::{Filter, Start, Update};
+pub use memory::Memory;
 pub use generator::Generator;
 pub use map::RangeMap;
 pub use maths::wrap_angle;

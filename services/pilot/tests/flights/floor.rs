@@ -75,3 +75,20 @@ fn a_pilot_that_forgot_the_way_lands_where_it_is() {
     assert!(fly(&mut rig, edge, 12.0, |rig| rig.phase() == Phase::Grounded), "{} m", rig.height);
     assert!((rig.place - from).norm() < 0.5, "{:?}", rig.place - from);
 }
+
+#[test]
+fn who_is_low_above_the_floor_is_not_sent_up_again() {
+    let mut rig = Rig::new(7);
+    rig.run(1.5);
+    rig.navigate(SetpointKind::Velocity, Vector::new(0.3, 0.0), NAN);
+    rig.order(Verb::PatrolStart);
+    rig.run(9.0);
+    rig.order(Verb::Land);
+    rig.cell_volts = 3.2;
+    // `failsafe.land_s` is 2 s: it is half-way down by then.
+    assert!(fly(&mut rig, f32::MAX, 4.0, |rig| rig.phase() == Phase::EmergencyLanding));
+    let from = rig.height;
+    assert!(from < 0.8, "{from} m");
+    let up = |rig: &Rig| rig.height > from + 0.05 || rig.phase() == Phase::Grounded;
+    assert!(fly(&mut rig, f32::MAX, 8.0, up) && rig.phase() == Phase::Grounded, "{} m", rig.height);
+}

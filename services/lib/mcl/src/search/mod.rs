@@ -11,6 +11,7 @@
 //! [`Search::new`].
 
 mod lattice;
+mod modes;
 mod tables;
 mod trail;
 
@@ -19,11 +20,11 @@ pub use trail::{MAX_HEARD, Trail, TrailPose};
 
 use crate::SonarConfig;
 use crate::map::RangeMap;
-use crate::maths::wrap_angle;
 use core::cmp::{Ordering, Reverse};
 use core::f32::consts::TAU;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
+use modes::Mode;
 use tables::{Columns, Tables};
 use trail::Heard;
 
@@ -46,19 +47,12 @@ const HOPELESS: f32 = 24.0;
 const CANDIDATES: usize = 2_048;
 /// Places that are improved.
 const MODES: usize = 48;
-/// Two places are one when they are nearer than this, metres and radians.
-const APART_M: f32 = 0.5;
-const APART_RAD: f32 = 0.26;
 /// A place that is believed is off by so much at most: what the set and the way err by.
 const LEASH_M: f32 = 0.25;
 /// Steps in which a place is improved: metres and radians.
 const FINE: [(f32, f32); 3] = [(0.1, 0.04), (0.05, 0.02), (0.02, 0.01)];
 /// Rounds at most with each of them.
 const ROUNDS: usize = 6;
-/// Exponent on the likelihood of all readings together: neighbours hear the same thing, and what is wrong with one is
-/// wrong with the next.
-const TEMPER: f32 = 0.25;
-
 /// A place where the drone may be: where it was in the trail's frame when the search began, on the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hypothesis {
@@ -109,16 +103,6 @@ impl PartialOrd for Candidate {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
-}
-
-/// A place that is being improved.
-#[derive(Clone, Copy, Debug)]
-struct Mode {
-    x: f32,
-    y: f32,
-    turn_rad: f32,
-    score: f32,
-    explained: f32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -267,7 +251,7 @@ impl Search {
                 }
                 Stage::Improve(next) => {
                     let Some(mode) = self.modes.get(next).copied() else {
-                        self.weigh();
+                        self.weighed = modes::weigh(&mut self.modes, self.suspect.as_ref(), &mut self.hypotheses);
                         self.stage = Stage::Done;
                         return true;
                     };
@@ -328,7 +312,7 @@ impl Search {
                 score: candidate.score,
                 explained: 0.0,
             };
-            if self.modes.iter().all(|other| apart(other, &mode)) {
+            if self.modes.iter().all(|other| other.is_apart(&mode)) {
                 self.modes.push(mode);
             }
         }
@@ -376,32 +360,4 @@ impl Search {
         mode.explained = self.fine.explained(&self.sonar, &self.heard);
         (mode, asked)
     }
-
-    /// The hypotheses from the modes: like ones are one, their weights sum to one.
-    fn weigh(&mut self) {
-        self.modes.sort_unstable_by(|a, b| b.score.total_cmp(&a.score));
-        self.hypotheses.clear();
-        let best = self.modes.first().map_or(0.0, |mode| mode.score);
-        let weighed = |mode: &Mode| Hypothesis {
-            x: mode.x,
-            y: mode.y,
-            turn_rad: wrap_angle(mode.turn_rad),
-            weight: (TEMPER * (mode.score - best)).exp(),
-            explained: mode.explained,
-        };
-        for (i, mode) in self.modes.iter().enumerate() {
-            if self.modes[..i].iter().all(|better| apart(better, mode)) {
-                self.hypotheses.push(weighed(mode));
-            }
-        }
-        self.weighed = self.suspect.as_ref().map(weighed);
-        let sum: f32 = self.hypotheses.iter().map(|hypothesis| hypothesis.weight).sum();
-        for hypothesis in self.hypotheses.iter_mut().chain(&mut self.weighed) {
-            hypothesis.weight /= sum.max(f32::MIN_POSITIVE);
-        }
-    }
-}
-
-fn apart(a: &Mode, b: &Mode) -> bool {
-    (a.x - b.x).hypot(a.y - b.y) > APART_M || wrap_angle(a.turn_rad - b.turn_rad).abs() > APART_RAD
 }
