@@ -6,7 +6,6 @@ use localization::{Localization, LocalizationConfig};
 use runtime::{Cache, Input, Lockstep, Output, StartError};
 use std::f32::consts::{FRAC_PI_4, PI};
 
-
 const MANIFEST: &str = r#"
 [system]
 name = "test"

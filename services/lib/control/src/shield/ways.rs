@@ -63,7 +63,8 @@ impl Shield {
             let distance = walls.distance(at.x, at.y);
             within = within && distance < radius;
             if distance < radius && (!within || distance < before - 0.2 * step) {
-                return way;
+                // As far as the walls were away before the step nothing can be met.
+                return way + (before - radius).max(0.0);
             }
             before = distance;
             way += step;

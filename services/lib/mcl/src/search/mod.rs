@@ -22,9 +22,9 @@ use crate::SonarConfig;
 use crate::map::RangeMap;
 use core::cmp::{Ordering, Reverse};
 use core::f32::consts::TAU;
+use modes::Mode;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
-use modes::Mode;
 use tables::{Columns, Tables};
 use trail::Heard;
 
@@ -251,7 +251,8 @@ impl Search {
                 }
                 Stage::Improve(next) => {
                     let Some(mode) = self.modes.get(next).copied() else {
-                        self.weighed = modes::weigh(&mut self.modes, self.suspect.as_ref(), &mut self.hypotheses);
+                        self.weighed =
+                            modes::weigh(&mut self.modes, self.suspect.as_ref(), &mut self.hypotheses);
                         self.stage = Stage::Done;
                         return true;
                     };
