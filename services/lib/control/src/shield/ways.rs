@@ -157,6 +157,24 @@ fn way_to(point: Vector, direction: Vector, wide: f32) -> f32 {
 mod tests {
     use super::way_to;
     use crate::planar::Vector;
+    use crate::shield::Shield;
+    use floorplan::DistanceField;
+
+    /// A wall a metre or two to the right, met head-on and aslant from four hundred places: the cells of the field are 5 cm wide,
+    /// and what is between their middles is interpolated.
+    #[test]
+    fn a_wall_straight_ahead_is_as_far_away_as_it_is() {
+        let blocked: Vec<bool> = (0..80 * 80).map(|cell| cell % 80 >= 60).collect();
+        let walls = DistanceField::from_blocked(&blocked, 80, 0.05, (0.0, 0.0), 3.0);
+        for k in 0..400u16 {
+            let from = Vector::new(0.8 + 0.0031 * f32::from(k), 2.0 + 0.0007 * f32::from(k));
+            for angle in [0.0f32, 0.01, -0.4] {
+                let way = Shield::plan_way(&walls, from, Vector::along(angle), 0.3);
+                let true_m = ((3.0 - from.x) - 0.3) / angle.cos();
+                assert!((way - true_m).abs() < 0.08, "{way} of {true_m} m from {from:?} along {angle}");
+            }
+        }
+    }
 
     /// A disc of 0.25 m that goes along x comes to touch at 0.6 m ahead, earlier or never by how far aside it is.
     #[test]
