@@ -206,7 +206,7 @@ fn a_start_without_a_place_is_refused_in_words() {
 
 #[test]
 fn the_shipped_configuration_is_the_default() {
-    let text = include_str!("../../../deploy/config/localization.toml");
+    let text = include_str!("../../../../deploy/config/localization.toml");
     let config: LocalizationConfig = runtime::parse_config("localization.toml", text).unwrap();
     assert_eq!(config, LocalizationConfig::default());
     let error =

@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, LEVEL, MS, PAD, SPEED, worst};
 use ipc_types::LocalizationState;
-use localization::{FilterKind, LocalizationConfig};
+use localization::{FilterKind, Localization, LocalizationConfig};
 
 fn thesis() -> LocalizationConfig {
     LocalizationConfig { filter: FilterKind::Thesis, ..LocalizationConfig::default() }
