@@ -83,7 +83,8 @@ fn who_is_low_above_the_floor_is_not_sent_up_again() {
     rig.navigate(SetpointKind::Velocity, Vector::new(0.3, 0.0), NAN);
     rig.order(Verb::PatrolStart);
     rig.run(9.0);
-    rig.order(Verb::Land);
+    let pad = rig.place;
+    rig.navigate(SetpointKind::Land, Vector::ZERO, pad);
     rig.cell_volts = 3.2;
     // `failsafe.land_s` is 2 s: it is half-way down by then.
     assert!(fly(&mut rig, f32::MAX, 4.0, |rig| rig.phase() == Phase::EmergencyLanding));
