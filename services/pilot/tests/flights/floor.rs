@@ -83,13 +83,14 @@ fn who_is_low_above_the_floor_is_not_sent_up_again() {
     rig.navigate(SetpointKind::Velocity, Vector::new(0.3, 0.0), NAN);
     rig.order(Verb::PatrolStart);
     rig.run(9.0);
-    let pad = rig.place;
+    // Nothing behind it was seen: from cruising height it would go back a little.
+    let pad = rig.place + Vector::new(0.4, 0.0);
     rig.navigate(SetpointKind::Land, Vector::ZERO, pad);
+    assert!(fly(&mut rig, f32::MAX, 12.0, |rig| rig.height < 0.9));
     rig.cell_volts = 3.2;
-    // `failsafe.land_s` is 2 s: it is half-way down by then.
     assert!(fly(&mut rig, f32::MAX, 4.0, |rig| rig.phase() == Phase::EmergencyLanding));
     let from = rig.height;
-    assert!(from < 0.8, "{from} m");
-    let up = |rig: &Rig| rig.height > from + 0.05 || rig.phase() == Phase::Grounded;
+    assert!((0.2..0.6).contains(&from), "{from} m");
+    let up = |rig: &Rig| rig.height > from + 0.15 || rig.phase() == Phase::Grounded;
     assert!(fly(&mut rig, f32::MAX, 8.0, up) && rig.phase() == Phase::Grounded, "{} m", rig.height);
 }
