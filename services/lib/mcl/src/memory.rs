@@ -59,24 +59,9 @@ mod tests {
         assert_eq!(Memory::from_array(&memory.to_array()), memory);
         let unknown = Memory { heading_mean: None, ..memory };
         assert_eq!(Memory::from_array(&unknown.to_array()), unknown);
-        let nonsense = Memory::from_array(&[
-            f32::NAN,
-            -1.0,
-            f32::INFINITY,
-            7.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        ]);
+        let mut told = [0.0; 16];
+        told[..4].copy_from_slice(&[f32::NAN, -1.0, f32::INFINITY, 7.0]);
+        let nonsense = Memory::from_array(&told);
         assert_eq!(nonsense, Memory { p_lost: 0.5, effective: 0.0, wanted: 0.0, heading_mean: None });
     }
 

@@ -265,41 +265,56 @@ mod tests {
     use super::*;
     use crate::generator::{Generator, Lanes};
 
+    /// x, y, heading offset, velocity x and y, level roll and pitch, weight.
+    type Columns = [[f32; BLOCK]; 8];
+
+    /// Applies a step so many times; before each of them `hold` sets what shall not wander.
+    fn fly(step: &Step, seed: u64, steps: usize, columns: &mut Columns, hold: impl Fn(&mut Columns)) {
+        let mut lanes = Lanes::new(&mut Generator::new(seed));
+        let mut noise = Box::new([[0.0; BLOCK]; NOISE_ROWS]);
+        for _ in 0..steps {
+            for row in noise.iter_mut() {
+                lanes.fill_normal(row);
+            }
+            hold(columns);
+            let [x, y, heading_offset, velocity_x, velocity_y, level_roll, level_pitch, weight] =
+                &mut *columns;
+            let mut particles = ParticlesMut {
+                x,
+                y,
+                heading_offset,
+                velocity_x,
+                velocity_y,
+                level_roll,
+                level_pitch,
+                weight,
+            };
+            step.apply(&mut particles, &noise);
+        }
+    }
+
+    /// Foretold and measured alike to a millimetre a second.
+    fn steady(speed: f32) -> Motion {
+        let flow = Some(Flow { velocity_x: speed, velocity_y: 0.0, sigma: 0.001 });
+        Motion { dt_s: 0.06, felt: Some([0.0; 2]), flow, ..Motion::default() }
+    }
+
+    fn root_mean_square(values: impl Iterator<Item = f32>) -> f32 {
+        (values.map(|value| value * value).sum::<f32>() / BLOCK as f32).sqrt()
+    }
+
     /// N = 256 particles, each 50 steps of 60 ms; the standard error of a spread is 1 / √(2 · 256) = 4 %.
     #[test]
     fn what_stands_stays_together_and_what_flies_spreads() {
         let config = MotionConfig::default();
         let spread_after = |speed: f32| {
-            let mut lanes = Lanes::new(&mut Generator::new(5));
-            let mut noise = Box::new([[0.0; BLOCK]; NOISE_ROWS]);
             let mut columns = [[0.0; BLOCK]; 8];
-            let [x, y, heading_offset, velocity_x, velocity_y, level_roll, level_pitch, weight] =
-                &mut columns;
-            velocity_x.fill(speed);
-            weight.fill(1.0 / BLOCK as f32);
-            // Foretold and measured alike to a millimetre a second: what spreads is the place.
-            let flow = Some(Flow { velocity_x: speed, velocity_y: 0.0, sigma: 0.001 });
-            let motion = Motion { dt_s: 0.06, felt: Some([0.0; 2]), flow, ..Motion::default() };
-            let step = Step::new(&config, &motion, 1.0, None);
-            for _ in 0..50 {
-                for row in noise.iter_mut() {
-                    lanes.fill_normal(row);
-                }
-                heading_offset.fill(0.0);
-                let mut particles = ParticlesMut {
-                    x,
-                    y,
-                    heading_offset,
-                    velocity_x,
-                    velocity_y,
-                    level_roll,
-                    level_pitch,
-                    weight,
-                };
-                step.apply(&mut particles, &noise);
-            }
+            columns[3].fill(speed);
+            columns[7].fill(1.0 / BLOCK as f32);
+            let step = Step::new(&config, &steady(speed), 1.0, None);
+            fly(&step, 5, 50, &mut columns, |columns| columns[2].fill(0.0));
             // Across the way, where the distance's own factor has no part.
-            (y.iter().map(|y| y * y).sum::<f32>() / BLOCK as f32).sqrt()
+            root_mean_square(columns[1].iter().copied())
         };
         let (stood, flew) = (spread_after(0.0), spread_after(0.4));
         let expected = [0.01 * 3.0f32.sqrt(), (0.01f32.powi(2) * 3.0 + 0.05f32.powi(2) * 1.2).sqrt()];
@@ -311,39 +326,16 @@ mod tests {
     #[test]
     fn the_heading_offset_wanders_as_far_as_compasses_err_and_no_farther() {
         let config = MotionConfig::default();
-        let flow = Some(Flow { velocity_x: 0.5, velocity_y: 0.0, sigma: 0.001 });
-        let motion = Motion { dt_s: 0.06, felt: Some([0.0; 2]), flow, ..Motion::default() };
         let spread = |mean: Option<f32>| {
-            let mut lanes = Lanes::new(&mut Generator::new(7));
-            let mut noise = Box::new([[0.0; BLOCK]; NOISE_ROWS]);
             let mut columns = [[0.0; BLOCK]; 8];
-            let [x, y, heading_offset, velocity_x, velocity_y, level_roll, level_pitch, weight] =
-                &mut columns;
-            heading_offset.fill(3.0);
-            let step = Step::new(&config, &motion, 1.0, mean);
-            for _ in 0..60_000 {
-                for row in noise.iter_mut() {
-                    lanes.fill_normal(row);
+            columns[2].fill(3.0);
+            let step = Step::new(&config, &steady(0.5), 1.0, mean);
+            fly(&step, 7, 60_000, &mut columns, |columns| {
+                for (column, value) in [(3, 0.5), (4, 0.0), (5, 0.0), (6, 0.0), (7, 1.0)] {
+                    columns[column].fill(value);
                 }
-                velocity_x.fill(0.5);
-                velocity_y.fill(0.0);
-                weight.fill(1.0);
-                level_roll.fill(0.0);
-                level_pitch.fill(0.0);
-                let mut particles = ParticlesMut {
-                    x,
-                    y,
-                    heading_offset,
-                    velocity_x,
-                    velocity_y,
-                    level_roll,
-                    level_pitch,
-                    weight,
-                };
-                step.apply(&mut particles, &noise);
-            }
-            let about = |offset: &f32| wrap_angle(offset - 3.0).powi(2);
-            (heading_offset.iter().map(about).sum::<f32>() / BLOCK as f32).sqrt()
+            });
+            root_mean_square(columns[2].iter().map(|offset| wrap_angle(offset - 3.0)))
         };
         // About a mean beside the half turn, so that wrapping is asked for.
         let held = spread(Some(3.0));
