@@ -23,6 +23,27 @@ message! {
         pub turn: f32,
         /// 1 while the take-over button is held.
         pub held: u32,
+        /// Bits: [`HEIGHT_HOLD`], [`HEADING_HOLD`].
+        pub switches: u32,
+        /// An [`ArmSwitch`] code.
+        pub arm: u32,
+    }
+}
+
+/// In [`Sticks::switches`]: a centred climb stick holds the height.
+pub const HEIGHT_HOLD: u32 = 1;
+/// In [`Sticks::switches`]: a centred turn stick holds the heading.
+pub const HEADING_HOLD: u32 = 2;
+
+codes! {
+    /// Where the arm channel of a human's transmitter stands.
+    pub enum ArmSwitch {
+        /// The device has none.
+        Absent = 0 => "absent",
+        /// Low: in the air, land.
+        Off = 1 => "off",
+        /// High: on the ground, arm and take off.
+        On = 2 => "on",
     }
 }
 
@@ -45,6 +66,18 @@ codes! {
         PatrolStop = 7 => "patrol stop",
         /// Return to the pad and land.
         Home = 8 => "home",
+        /// Brake and hover; land if nobody orders anything else for a while.
+        Stop = 9 => "stop",
+        /// Stop the motors at once: the drone falls.
+        Cut = 10 => "cut",
+        /// Give me the sticks.
+        SticksTake = 11 => "sticks take",
+        /// I let go of them.
+        SticksRelease = 12 => "sticks release",
+        /// Nothing automatic moves the drone until it is allowed again, but failsafes and home.
+        AutomaticOff = 13 => "automatic off",
+        /// The automatic may move it again; nothing begins by itself.
+        AutomaticOn = 14 => "automatic on",
     }
 }
 
@@ -75,6 +108,8 @@ message! {
         pub expiry_ns: u64,
         /// Lease under which it is given; 0 for commands that need none.
         pub lease: u64,
+        /// Which connection of the account it came by: a lease belongs to one; 0 for the command line on the drone.
+        pub socket: u64,
         /// Plan frame, for `goto`; NaN otherwise.
         pub x_m: f32,
         /// Plan frame, for `goto`; NaN otherwise.
@@ -85,8 +120,10 @@ message! {
         pub command_sequence: u32,
         /// Account, or `local` for the command line on the drone.
         pub account: Text<32>,
-        /// Role of the account.
+        /// Role of the account, capped by that of the certificate.
         pub role: Text<16>,
+        /// Name of the certificate by which it came; empty for the command line on the drone.
+        pub certificate: Text<32>,
     }
 }
 

@@ -122,6 +122,24 @@ codes! {
     }
 }
 
+codes! {
+    /// How far a human has the drone in hand.
+    pub enum SticksState {
+        /// Nobody holds the sticks.
+        Free = 0 => "free",
+        /// Granted; the drone comes to a stop first.
+        Stopping = 1 => "stopping",
+        /// It stands; the sticks must pass neutral.
+        AwaitingNeutral = 2 => "awaiting neutral sticks",
+        /// It follows while the button is held.
+        Ready = 3 => "ready",
+        /// It follows.
+        Following = 4 => "following",
+        /// Nothing new is heard of the holder: it hovers.
+        Silent = 5 => "silent",
+    }
+}
+
 message! {
     /// What the pilot is doing: survives a restart of the pilot.
     pub struct PilotState on "pilot/state" {
@@ -131,6 +149,12 @@ message! {
         pub failsafe_since_ns: u64,
         /// Stamp of the newest operator command heard; 0 before any.
         pub command_ns: u64,
+        /// The lease of the sticks: numbers never come back; 0 while nobody holds them.
+        pub lease: u64,
+        /// The connection that holds them; 0 while nobody does.
+        pub holder_socket: u64,
+        /// When a stop that nobody answers lands the drone; 0 without one.
+        pub stop_lands_ns: u64,
         /// Causes that hold now: bit = [`FailsafeCause`] code.
         pub causes: u32,
         /// Sequence of the last operator command heard: what `answer` is about.
@@ -186,6 +210,14 @@ message! {
         pub if_controller_lost: u8,
         /// If what is known of the battery were lost.
         pub if_charge_lost: u8,
+        /// A [`SticksState`] code.
+        pub sticks: u8,
+        /// 1 while the automatic may move the drone.
+        pub automatic: u8,
+        /// Always zero.
+        pub reserved: [u8; 2],
+        /// Age of the holder's newest input on the drone's clock, milliseconds; NaN without a holder.
+        pub sticks_age_ms: f32,
         /// The answer in one sentence.
         pub answer_text: Text<96>,
         /// Who holds the sticks; empty for nobody.

@@ -1,0 +1,1 @@
+//! The drone on zenoh: what its topics say goes out, orders come in.

@@ -1,0 +1,1 @@
+//! The drone's picture: raw frames in, H.264 out, asleep while nobody watches.

@@ -1,0 +1,1 @@
+//! The watch room: HTTPS, accounts and the page, as a zenoh client.

@@ -1,0 +1,2 @@
+//! The watch room: HTTPS, accounts and the page, as a zenoh client.
+fn main() {}
