@@ -72,6 +72,16 @@ pub(crate) enum Verb {
     },
     /// Start, pause or stop the round.
     Patrol { order: PatrolOrder },
+    /// Brake and hover; the drone lands if nobody orders anything else for a while.
+    Stop,
+    /// Stop the motors at once: in the air the drone falls.
+    Cut {
+        /// Without this it is refused.
+        #[arg(long)]
+        yes_it_falls: bool,
+    },
+    /// Off: nothing automatic moves the drone but failsafes and the way home. On: it may again; nothing begins by itself.
+    Automatic { switch: Switch },
     /// Look at what flows between the services.
     Topic {
         #[command(subcommand)]
@@ -107,6 +117,21 @@ impl From<PatrolOrder> for Order {
             PatrolOrder::Start => Self::PatrolStart,
             PatrolOrder::Pause => Self::PatrolPause,
             PatrolOrder::Stop => Self::PatrolStop,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum Switch {
+    On,
+    Off,
+}
+
+impl From<Switch> for Order {
+    fn from(switch: Switch) -> Self {
+        match switch {
+            Switch::On => Self::AutomaticOn,
+            Switch::Off => Self::AutomaticOff,
         }
     }
 }

@@ -25,6 +25,10 @@ pub(crate) enum Order {
     PatrolStart,
     PatrolPause,
     PatrolStop,
+    Stop,
+    Cut,
+    AutomaticOn,
+    AutomaticOff,
 }
 
 impl Order {
@@ -39,8 +43,20 @@ impl Order {
             Self::PatrolStart => (Verb::PatrolStart, nowhere, nowhere),
             Self::PatrolPause => (Verb::PatrolPause, nowhere, nowhere),
             Self::PatrolStop => (Verb::PatrolStop, nowhere, nowhere),
+            Self::Stop => (Verb::Stop, nowhere, nowhere),
+            Self::Cut => (Verb::Cut, nowhere, nowhere),
+            Self::AutomaticOn => (Verb::AutomaticOn, nowhere, nowhere),
+            Self::AutomaticOff => (Verb::AutomaticOff, nowhere, nowhere),
         }
     }
+}
+
+/// Cuts the motors, when it is said that the drone falls.
+pub(crate) fn cut(place: &Place, yes_it_falls: bool, json: bool) -> Result<ExitCode> {
+    if !yes_it_falls {
+        bail!("cut: stops the motors at once, and in the air the drone falls; say --yes-it-falls if that is meant");
+    }
+    give(place, Order::Cut, json)
 }
 
 pub(crate) fn give(place: &Place, order: Order, json: bool) -> Result<ExitCode> {

@@ -96,14 +96,17 @@ impl Reply {
 #[must_use]
 pub fn obeyed_by(verb: Verb) -> &'static [&'static str] {
     match verb {
-        Verb::TakeOff => &["pilot"],
+        Verb::TakeOff | Verb::Cut | Verb::SticksRelease | Verb::AutomaticOn => &["pilot"],
         Verb::Land
         | Verb::Hold
         | Verb::GoTo
         | Verb::PatrolStart
         | Verb::PatrolPause
         | Verb::PatrolStop
-        | Verb::Home => &["pilot", "navigation"],
+        | Verb::Home
+        | Verb::Stop
+        | Verb::SticksTake
+        | Verb::AutomaticOff => &["pilot", "navigation"],
     }
 }
 

@@ -195,19 +195,20 @@ impl Mission {
 
     fn follow(&mut self, verb: Verb, there: (f32, f32), here: Option<(f32, f32)>) -> (Answer, Option<Event>) {
         match verb {
-            Verb::TakeOff => (Answer::Accepted, None),
+            // The pilot's alone.
+            Verb::TakeOff | Verb::Cut | Verb::SticksRelease | Verb::AutomaticOn => (Answer::Accepted, None),
             Verb::Land => {
                 self.stop(PatrolState::Idle, None);
                 (Answer::Accepted, Some(Event::Drop))
             }
-            Verb::Hold | Verb::PatrolPause => {
+            Verb::Hold | Verb::PatrolPause | Verb::Stop | Verb::SticksTake | Verb::AutomaticOff => {
                 let paused =
                     self.goal == Goal::Round && (self.under_way() || self.state == PatrolState::Paused);
                 if paused {
                     self.state = PatrolState::Paused;
                     self.hold = here;
                     (Answer::Accepted, Some(Event::Drop))
-                } else if verb == Verb::Hold {
+                } else if verb != Verb::PatrolPause {
                     self.stop(PatrolState::Idle, here);
                     (Answer::Accepted, Some(Event::Drop))
                 } else {

@@ -135,12 +135,22 @@ impl PilotCore {
                 self.land(now, None);
                 Ok("landing: the operator's order")
             }
-            (Verb::Hold, Phase::TakeOff) => {
+            (Verb::Stop, Phase::Grounded) => refused("refused: on the ground"),
+            (Verb::Stop, Phase::Arming) => Ok(self.call_off(now)),
+            (Verb::Hold | Verb::Stop, Phase::TakeOff) => {
                 self.after_take_off = Phase::Hover;
                 Ok("hovering after the take-off")
             }
-            (Verb::Hold, Phase::EmergencyLanding) => refused("refused: emergency landing"),
-            (Verb::Hold, Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing) => {
+            (Verb::Hold | Verb::Stop, Phase::EmergencyLanding) => refused("refused: emergency landing"),
+            (Verb::Cut, Phase::Grounded) => refused("refused: the motors are off"),
+            (Verb::Cut, _) => {
+                self.enter(now, Phase::Cut);
+                Ok("motors cut: the drone falls")
+            }
+            (Verb::SticksTake | Verb::SticksRelease | Verb::AutomaticOff | Verb::AutomaticOn, _) => {
+                refused("refused: no sticks in this system yet")
+            }
+            (Verb::Hold | Verb::Stop, Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing) => {
                 self.operator_land = false;
                 self.hold = None;
                 self.hold_heading = None;
