@@ -12,6 +12,8 @@
 //! not SI carries its unit in its name. "Absent" is NaN for floats and 0 for times unless said otherwise.
 #![forbid(unsafe_code)]
 
+mod bytes;
+mod camera;
 mod code;
 mod field;
 mod flight;
@@ -26,6 +28,8 @@ mod text;
 mod topics;
 mod trace;
 
+pub use bytes::Bytes;
+pub use camera::*;
 pub use field::{Field, Header, Message, layout_of_name, layout_step};
 pub use flight::*;
 pub use health::*;

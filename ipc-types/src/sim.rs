@@ -98,3 +98,53 @@ message! {
         pub people: [PersonTruth; 16],
     }
 }
+
+fields! {
+    /// A person as a camera sees one.
+    pub struct PersonView {
+        /// World frame.
+        pub x_m: f32,
+        /// World frame.
+        pub y_m: f32,
+        /// From the floor to the top of the head.
+        pub height_m: f32,
+        /// Where the person looks, radians from world x.
+        pub heading_rad: f32,
+    }
+}
+
+message! {
+    /// What the simulated camera looks at, for the process that renders it: sent for each frame that somebody wants.
+    pub struct View on "sim/view" {
+        /// When the light falls in.
+        pub capture_ns: u64,
+        /// Simulated time since the simulator started.
+        pub time_s: f64,
+        /// Seed of the world: the same plan, files, settings and seed give the same world.
+        pub seed: u64,
+        /// Bit = index in the world's list of doors: shut now.
+        pub doors_shut: u64,
+        /// Centre of mass, world frame.
+        pub x_m: f32,
+        /// World frame.
+        pub y_m: f32,
+        /// Above the floor.
+        pub z_m: f32,
+        /// Right side down positive.
+        pub roll_rad: f32,
+        /// Nose down positive.
+        pub pitch_rad: f32,
+        /// World frame.
+        pub yaw_rad: f32,
+        /// Filled people; more than [`MAX_PEOPLE`] is a broken message.
+        pub people_used: u32,
+        /// Pixels, as wished for.
+        pub width: u32,
+        /// Pixels, as wished for.
+        pub height: u32,
+        /// Always zero.
+        pub reserved: u32,
+        /// Those who walk.
+        pub people: [PersonView; 16],
+    }
+}

@@ -2,7 +2,8 @@
 
 use crate::{
     Attitude, Channels, Command, Echo, FlightState, FlowMotion, Grid, Health, Message, Particles, Patrol,
-    PilotState, Ping, Polar, Pose, Power, Setpoint, SonarRanges, Sticks, Trace, Truth,
+    Picture, PilotState, Ping, Polar, Pose, Power, Setpoint, SignalIn, SignalOut, SonarRanges, Sticks, Trace,
+    Truth, Video, View, Wish,
 };
 
 /// Something to be done with a message type known only by its topic.
@@ -39,6 +40,7 @@ topics!(
     Ping,
     Echo,
     Truth,
+    View,
     Attitude,
     FlightState,
     Power,
@@ -52,6 +54,11 @@ topics!(
     PilotState,
     Sticks,
     Command,
+    Picture,
+    Video,
+    Wish,
+    SignalIn,
+    SignalOut,
     Health,
     Trace,
 );
