@@ -30,13 +30,17 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Messages past 64 KiB are few and far between: their queues are short, as each place is paid for.
+    /// The larger the messages, the fewer places, as each is paid for by every publisher: (depth + held) * readers of them.
     #[must_use]
     pub const fn of<T: Message>() -> Self {
-        if size_of::<T>() > 65_536 {
-            Self { depth: 2, held: 2, readers: 6 }
-        } else {
-            Self { depth: 16, held: 4, readers: 16 }
+        match size_of::<T>() {
+            // Raw pictures: read by the camera, and by a program that looks in.
+            2_097_152.. => Self { depth: 1, held: 2, readers: 2 },
+            // Particles: few and far between.
+            524_288.. => Self { depth: 2, held: 2, readers: 6 },
+            // Encoded video, of which each frame lost is a picture that stands still, and what viewers say.
+            65_537.. => Self { depth: 8, held: 2, readers: 6 },
+            _ => Self { depth: 16, held: 4, readers: 16 },
         }
     }
 }
