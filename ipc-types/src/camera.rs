@@ -17,7 +17,7 @@ pub const WISH_LIFE_NS: u64 = 1_000_000_000;
 const WISH_AHEAD_NS: u64 = 100_000_000;
 
 message! {
-    /// One raw frame, I420 in full range: the luma plane of `stride` by `height` bytes, then the two chroma planes (blue
+    /// One raw frame, I420 in limited range (BT.601, luma 16 to 235): the luma plane of `stride` by `height` bytes, then the two chroma planes (blue
     /// difference, red difference) of half that stride and height each, one behind the other.
     pub struct Picture on "camera/picture" {
         /// When the light fell in: the middle of the exposure.
