@@ -1,2 +1,6 @@
-//! The drone on zenoh: what its topics say goes out, orders come in.
-fn main() {}
+//! The bridge as a process.
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    runtime::main::<bridge::Bridge>(runtime::NoDevices)
+}

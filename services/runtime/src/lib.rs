@@ -24,12 +24,14 @@ mod instance;
 mod journal;
 mod lockstep;
 mod notify;
+pub mod orders;
 mod port;
 mod ports;
 mod process;
 mod service;
 pub mod shm;
 mod start;
+mod waker;
 
 pub use config::{ConfigError, Validate, parse_config, within};
 pub use device::{ByteDevice, DeviceError, Devices, MemoryDevice, NoDevices};
@@ -42,6 +44,7 @@ pub use ports::Ports;
 pub use process::{Tool, env, known_topics, load_manifest, main, monotonic_ns};
 pub use service::Service;
 pub use start::{Cache, Start};
+pub use waker::Waker;
 
 /// FNV-1a hash of bytes: for names, configurations and plans, never for secrets.
 #[must_use]

@@ -6,7 +6,7 @@ use crate::journal::{Cursor, Taken};
 use crate::lockstep::bus::Bus;
 use crate::port::{InputKind, OutputKind, StepContext};
 use crate::shm::SharedNode;
-use crate::{Input, Limits, Output, StartError, access, name_hash};
+use crate::{Input, Limits, Output, StartError, Waker, access, name_hash};
 use ipc_types::{Message, Run};
 use manifest::{Manifest, Subscription};
 use std::cell::Cell;
@@ -34,6 +34,8 @@ pub struct Ports {
     pub(crate) retained: Vec<String>,
     /// Topics of `retained` that the keeper did not hand over in time.
     pub(crate) forgotten: Vec<&'static str>,
+    /// What wakes the service from outside the bus, if it wants to be.
+    pub(crate) waker: Option<Waker>,
 }
 
 impl Ports {
@@ -58,6 +60,7 @@ impl Ports {
             devices,
             retained,
             forgotten: Vec::new(),
+            waker: None,
         }
     }
 
@@ -172,6 +175,26 @@ impl Ports {
                 self.devices.device(name, &path)
             }
         }
+    }
+
+    /// What another thread of this service wakes it by, when something comes that is on no topic.
+    ///
+    /// # Errors
+    /// When the system has no descriptor left.
+    pub fn waker(&mut self) -> Result<Waker, StartError> {
+        if let Some(waker) = &self.waker {
+            return Ok(waker.clone());
+        }
+        let waker = Waker::new()?;
+        self.waker = Some(waker.clone());
+        Ok(waker)
+    }
+
+    /// The topics that the manifest lets this service read; none for a tool, which may read almost all.
+    #[must_use]
+    pub fn readable(&self) -> Vec<String> {
+        let entry = self.manifest.services.get(&self.service);
+        entry.map(|service| service.subscribes.keys().cloned().collect()).unwrap_or_default()
     }
 
     /// After a restart: the last valid sample of a retained topic, from the keeper. `None` at the first

@@ -171,7 +171,7 @@ fn run<S: Service>(devices: Box<dyn Devices>, notifier: &Notifier) -> Result<(),
     while !stop.load(Ordering::Relaxed) {
         let now = monotonic_ns();
         let due = next_tick.min(next_heartbeat);
-        let woken = woken_within(&listener, due.saturating_sub(now));
+        let woken = woken_within(&listener, instance.ports().waker.as_ref(), due.saturating_sub(now));
         let now = monotonic_ns();
         let lateness = now.saturating_sub(next_tick);
         if woken || now >= next_tick {

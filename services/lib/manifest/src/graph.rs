@@ -21,6 +21,10 @@ impl Manifest {
         }
         let mut people = BTreeSet::new();
         for topic in self.topics() {
+            // Every service has these; drawn, they would hide the rest.
+            if topic.name.starts_with("health/") || topic.name.starts_with("trace/") {
+                continue;
+            }
             let outside = topic.name.starts_with("operator/");
             let publishers: Vec<&str> = if outside {
                 vec!["operator"]
