@@ -32,7 +32,7 @@ impl Clock for SystemClock {
 ///
 /// # Errors
 /// When it has none.
-pub fn random<const N: usize>() -> Result<[u8; N], getrandom::Error> {
+pub(crate) fn random<const N: usize>() -> Result<[u8; N], getrandom::Error> {
     let mut bytes = [0; N];
     getrandom::fill(&mut bytes)?;
     Ok(bytes)

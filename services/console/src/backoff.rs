@@ -17,7 +17,7 @@ pub const LONGEST_MS: u64 = 60_000;
 /// Failures are forgotten after this long without another.
 const FORGET_MS: u64 = 30 * 60_000;
 /// Rows kept in each table; the one whose last failure is longest ago makes room.
-pub const ROWS: usize = 4096;
+pub(crate) const ROWS: usize = 4096;
 
 #[derive(Clone, Copy, Debug)]
 struct Row {

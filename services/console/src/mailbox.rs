@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::Notify;
 
 /// Lines that wait at most; the oldest goes.
-pub const LINES: usize = 128;
+pub(crate) const LINES: usize = 128;
 /// Topics with a slot at most; what is on others is lost.
-pub const SLOTS: usize = 64;
+pub(crate) const SLOTS: usize = 64;
 
 #[derive(Debug)]
 struct Slot<T> {
