@@ -1,0 +1,63 @@
+// The event log of a watch: what changed, as entries {at, kind, tone, key, values}. Words are found when it is shown.
+
+import { ACTIONS, CAUSES, PATROL, PHASES, ROOMS, STICKS, word } from "./codes.js";
+
+const MOST = 300;
+const PHASE_TONE = { emergency: "alarm", cut: "alarm", manual: "lamp" };
+
+export class Chronicle {
+  constructor() {
+    this.entries = [];
+    this.count = 0;
+    this.before = null;
+  }
+  add(at, kind, tone, key, values = {}) {
+    this.count += 1;
+    this.entries.unshift({ number: this.count, at, kind, tone, key, values });
+    if (this.entries.length > MOST) this.entries.length = MOST;
+  }
+  /** Compares with what was there at the last look; the first look tells nothing but how things stand. */
+  look(pilot, patrol, pose, at) {
+    const now = {
+      phase: pilot ? word(PHASES, pilot.phase) : null,
+      failsafe: pilot && pilot.cause > 0 && pilot.action > 0 ? `${word(CAUSES, pilot.cause)}/${word(ACTIONS, pilot.action)}` : "",
+      holder: pilot?.holder ?? "",
+      sticks: pilot ? word(STICKS, pilot.sticks ?? 0) : null,
+      automatic: pilot?.automatic ?? 1,
+      round: patrol ? word(PATROL, patrol.state) : null,
+      rooms: patrol ? (patrol.rooms ?? []).slice(0, patrol.rooms_used).map((room) => ({ name: room.name, state: word(ROOMS, room.state), reason: room.reason })) : null,
+    };
+    const before = this.before;
+    this.before = { ...now, rooms: now.rooms ?? before?.rooms ?? null, phase: now.phase ?? before?.phase, round: now.round ?? before?.round };
+    if (!before) return;
+    if (before.phase && now.phase && now.phase !== before.phase) this.add(at, "phase", PHASE_TONE[now.phase] ?? "info", `phase.${now.phase}`);
+    if (now.failsafe !== before.failsafe) {
+      if (now.failsafe) {
+        const [cause, action] = now.failsafe.split("/");
+        this.add(at, "failsafe", "alarm", "event.failsafe", { cause: { key: `cause.${cause}` }, action: { key: `action.${action}` } });
+      } else this.add(at, "failsafe", "ok", "event.failsafe_over");
+    }
+    if (now.holder !== before.holder) {
+      if (now.holder) this.add(at, "sticks", "lamp", "event.holder", { holder: now.holder });
+      else this.add(at, "sticks", "info", "event.no_holder");
+    }
+    if (now.automatic !== before.automatic) this.add(at, "automatic", "caution", now.automatic ? "event.automatic_on" : "event.automatic_off");
+    if (before.round && now.round && now.round !== before.round && now.round !== "idle") this.add(at, "round", now.round === "failed" ? "alarm" : "info", `round.${now.round}`);
+    for (const room of now.rooms ?? []) {
+      const was = before.rooms?.find((one) => one.name === room.name);
+      if (!was || was.state === room.state || !["seen", "skipped", "partly"].includes(room.state)) continue;
+      this.add(at, "room", room.state === "seen" ? "ok" : "caution", `event.room_${room.state}`, { room: room.name, reason: { sentence: room.reason } });
+    }
+  }
+  ordered(verb, { outcome, text }, at) {
+    this.add(at, "order", outcome === "accepted" ? "lamp" : "caution", `event.order_${outcome}`, { verb: { key: `verb.${verb}` }, text: { sentence: text } });
+  }
+  /** A line from the console: {text, account?, drone?, time_ms?} or a bare sentence. */
+  told(line, at) {
+    const text = typeof line === "string" ? line : line.text ?? line.answer ?? "";
+    const who = typeof line === "string" ? "" : line.account ?? "";
+    const verb = typeof line === "object" && line.verb ? { key: `verb.${line.verb}` } : "";
+    if (!text && !verb) return;
+    this.add(line.time_ms ?? at, "told", line.tone ?? "info", verb ? "event.told_verb" : who ? "event.told_by" : "event.told", { who, verb, text: { sentence: text } });
+  }
+}
