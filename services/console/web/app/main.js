@@ -1,7 +1,7 @@
 // The page's beginning: who is there, which view, in which language and light.
 
 import * as api from "./net/api.js";
-import { h, fill } from "./view/dom.js";
+import { h, fill, loadIcons } from "./view/dom.js";
 import { frame } from "./view/frame.js";
 import { claimView, loginView } from "./view/doors.js";
 import { accountsView } from "./view/accounts.js";
@@ -83,5 +83,6 @@ addEventListener("sereno:session", reload);
 
 fill(root, h("p", { class: "unseen", role: "status" }, t("app.loading")));
 beginTheme();
+loadIcons();
 beginLanguage(null, false, draw);
 reload();

@@ -9,14 +9,14 @@ export const KEY_SHARE = 0.6;
 
 /** Whether the key flies. */
 export function flies(code) {
-  return code === "Space" || code in KEYS;
+  return code === "Space" || Object.hasOwn(KEYS, code);
 }
 
 /** The wish of the keys that are down. */
 export function wishOf(down) {
   const wish = { forward: 0, left: 0, up: 0, turn: 0, held: down.has("Space"), arm: "absent" };
   for (const code of down) {
-    const key = KEYS[code];
+    const key = Object.hasOwn(KEYS, code) ? KEYS[code] : null;
     if (key) wish[key[0]] += key[1] * KEY_SHARE;
   }
   return wish;

@@ -18,5 +18,6 @@ export function openDialog(title, make) {
   dialog.addEventListener("close", () => dialog.remove());
   document.body.append(dialog);
   dialog.showModal();
+  dialog.querySelector("input:not([type=hidden]), select, textarea")?.focus();
   return close;
 }

@@ -33,21 +33,35 @@ function assign(element, properties) {
 }
 
 function append(element, children) {
-  for (const child of children.flat()) {
+  for (const child of children.flat(Infinity)) {
     if (child === null || child === undefined || child === false) continue;
     element.append(child);
   }
 }
 
+/** Puts the symbols of `icons.svg` into the page once: a reference into a file of its own would blink each time it is made. */
+export async function loadIcons() {
+  try {
+    const response = await fetch("/app/icons.svg");
+    const sheet = new DOMParser().parseFromString(await response.text(), "image/svg+xml").documentElement;
+    for (const symbol of sheet.querySelectorAll("symbol")) symbol.id = `icon-${symbol.id}`;
+    sheet.setAttribute("class", "unseen");
+    sheet.setAttribute("aria-hidden", "true");
+    document.body.prepend(document.importNode(sheet, true));
+  } catch {
+    // Every icon has words beside it.
+  }
+}
+
 /** An icon of `icons.svg`; decoration only. */
 export function icon(name) {
-  return s("svg", { class: "icon", "aria-hidden": "true", focusable: "false" }, s("use", { href: `/app/icons.svg#${name}` }));
+  return s("svg", { class: "icon", "aria-hidden": "true", focusable: "false" }, s("use", { href: `#icon-${name}` }));
 }
 
 /** Shows another icon in an element that `icon` made. */
 export function setIcon(svg, name) {
   const use = svg.firstElementChild;
-  const href = `/app/icons.svg#${name}`;
+  const href = `#icon-${name}`;
   if (use.getAttribute("href") !== href) use.setAttribute("href", href);
 }
 

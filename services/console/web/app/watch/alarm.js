@@ -47,7 +47,7 @@ export class AlarmPanel {
       session.alarms.acknowledge();
       this.update();
     } });
-    this.element = h("div", { class: "alarm", role: "alert", hidden: true }, icon("alert"), this.words, this.wake, this.acknowledge);
+    this.element = h("div", { class: "alarm-banner", role: "alert", hidden: true }, icon("alert"), this.words, this.wake, this.acknowledge);
     this.shown = "";
     this.next = 0;
   }

@@ -145,7 +145,7 @@ export function drawRooms(view) {
     const x = projection.x((box.left + box.right) / 2);
     const y = projection.y(box.top) + Math.min(((box.top - box.bottom) * projection.scale) / 2, 1.9 * view.em);
     const sign = ROOM_SIGN[state] ? `${ROOM_SIGN[state]} ` : "";
-    label(view, `${sign}${room.name}`, x, y, { color: colors[state] ?? palette.label, size: 0.86, weight: state === "entered" ? 680 : 580, fit: width });
+    label(view, `${sign}${room.name}`, x, y, { color: colors[state] ?? palette.label, size: projection.scale < 22 ? 0.74 : 0.86, weight: state === "entered" ? 680 : 580, fit: width });
   }
 }
 

@@ -20,7 +20,6 @@ export class ManualPanel {
     this.take = button(t("sticks.take"), "hand", { class: "primary sticks-take", onclick: () => this.control.take() });
     this.release = button(t("sticks.release"), "out", { class: "sticks-release", onclick: () => this.control.release() });
     this.trouble = h("p", { class: "note bad", role: "alert", hidden: true });
-    this.frozen = h("p", { class: "note sticks-frozen", hidden: true });
     this.device = h("div", { class: "device" });
     this.bars = h("div", { class: "channels" });
     this.hold = touch.holdButton(t("sticks.hold"), t("sticks.hold_hint"));
@@ -30,7 +29,7 @@ export class ManualPanel {
       h("input", { type: "checkbox", role: "switch", checked: this.control.switches[name], onchange: (event) => this.control.setSwitch(name, event.target.checked) }), h("span", {}, t(`sticks.${name}`)));
     this.element = h("section", { class: "panel manual", "aria-labelledby": "manual-name" },
       h("header", { class: "panel-head" }, icon("sticks"), h("h2", { id: "manual-name" }, t("sticks.name")), iconButton(t("sticks.close"), "cross", { onclick: done })),
-      this.stateBox, this.trouble, this.take, this.frozen,
+      this.stateBox, this.trouble, this.take,
       h("div", { class: "touch-sticks" }, left, this.hold, right),
       this.release,
       this.device, this.bars,
@@ -48,10 +47,13 @@ export class ManualPanel {
     const lease = control.hasLease;
     const state = lease ? control.sticksState : "free";
     const other = control.otherHolder;
-    setData(this.stateBox, "tone", TONE[state] ?? "info");
+    const frozen = control.open ? control.liveness.frozen(now) : null;
+    const dead = frozen !== null && (lease || frozen !== "silent");
+    setData(this.stateBox, "tone", dead ? "caution" : TONE[state] ?? "info");
+    setData(this.stateBox, "frozen", frozen ?? "");
     setText(this.state, other ? t("sticks.other", { holder: other }) : t(`sticks.state.${state}`));
     const age = lease && Number.isFinite(pilot?.sticks_age_ms) ? ` · ${t("sticks.age", { age: number(pilot.sticks_age_ms) })}` : "";
-    setText(this.hint, `${t(other ? "sticks.hint.other" : `sticks.hint.${state}`)}${age}`);
+    setText(this.hint, `${t(dead ? `frozen.${frozen}` : other ? "sticks.hint.other" : `sticks.hint.${state}`)}${age}`);
     show(this.take, !lease);
     this.take.disabled = control.asked !== null || !control.socket?.open;
     setData(this.take, "pending", control.asked !== null);
@@ -59,11 +61,6 @@ export class ManualPanel {
     const refused = control.answer && control.answer.outcome !== "accepted" && !lease;
     show(this.trouble, Boolean(refused));
     if (refused) setText(this.trouble, sentence(control.answer.text) || t(`answer.${control.answer.outcome}`));
-    const frozen = control.open ? control.liveness.frozen(now) : null;
-    const tell = frozen !== null && (lease || frozen !== "silent");
-    show(this.frozen, tell);
-    setData(this.frozen, "reason", frozen ?? "");
-    if (tell) setText(this.frozen, t(`frozen.${frozen}`));
     setData(this.element, "lease", lease);
     setData(this.hold, "live", state);
     this.showPad();

@@ -87,7 +87,7 @@ export class PlanPanel {
     const { ground, projection, em } = this.view;
     if (!ground) return;
     const tall = projection.height > projection.width;
-    projection.fit(ground.box, { top: (tall ? 7.2 : 8) * em, right: tall ? 1 * em : 4.6 * em, bottom: 2.2 * em, left: (tall ? 1 : 1.6) * em });
+    projection.fit(ground.box, { top: (tall ? 7.2 : 8) * em, right: tall ? 1 * em : 4.6 * em, bottom: (tall ? 4 : 2.2) * em, left: (tall ? 1 : 1.6) * em });
     projection.least = projection.scale * 0.5;
     this.touched = false;
     this.setFollow(false);
@@ -248,7 +248,7 @@ export class PlanPanel {
     drawDrone(view, fresh === "live" || fresh === "late");
     if (this.asking?.place) drawTarget(view, this.asking.place, true);
     const tall = projection.height > projection.width;
-    drawScale(view, projection.width - (tall ? 4.2 : 4.6) * view.em, projection.height - 0.8 * view.em);
+    drawScale(view, projection.width - (tall ? 1.2 : 4.6) * view.em, projection.height - (tall ? 1.2 : 0.8) * view.em);
   }
   end() {
     cancelAnimationFrame(this.handle);

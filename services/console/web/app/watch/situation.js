@@ -10,6 +10,10 @@ import { t, written } from "../words/text.js";
 const TRUST_ICON = { sure: "check", fair: "check", unsure: "alert", searching: "eye", lost: "alert" };
 const PHASE_ICON = { grounded: "land", arming: "takeoff", takeoff: "takeoff", hover: "pause", autonomous: "lantern", manual: "sticks", landing: "land", emergency: "alert", cut: "cut" };
 
+const DOING_ICON = { "doing.flying": "lantern", "doing.paused": "pause", "doing.returning": "home", "doing.landing": "land", "doing.going": "target", "doing.planning": "wait", "doing.stopped": "stop" };
+/** How sure it is changes with every message; words that change so often cannot be read. */
+const CALM_MS = 1000;
+
 /** An age in words: "0.3 s", "4 s", "2 min". */
 export function ageWords(ms) {
   const { key, value } = ageParts(ms);
@@ -53,15 +57,20 @@ export class SituationPanel {
     const { pilot, patrol, pose, telemetry, about } = this.session;
     const fresh = telemetry.news.freshness("pilot/state", now);
     const phase = pilot ? word(PHASES, pilot.phase) : "unknown";
-    const title = t(doing(pilot, patrol));
+    const key = doing(pilot, patrol);
+    const title = t(key);
     setText(this.title, title);
-    setIcon(this.phaseIcon, PHASE_ICON[phase] ?? "wait");
+    setIcon(this.phaseIcon, DOING_ICON[key] ?? PHASE_ICON[phase] ?? "wait");
     setData(this.element, "phase", phase);
     const room = pose && !pose.searching ? roomAt(about?.rooms ?? [], pose.x_m, pose.y_m) : null;
     setText(this.place, this.placeWords(pilot, patrol, room));
     const trust = this.session.trust;
     show(this.trust, Boolean(pose));
-    setText(this.trustWords, trustWords(trust));
+    if (trust.key !== this.trustKey || now - this.trustAt > CALM_MS) {
+      this.trustKey = trust.key;
+      this.trustAt = now;
+      setText(this.trustWords, trustWords(trust));
+    }
     setIcon(this.trustIcon, TRUST_ICON[trust.level]);
     setData(this.trust, "level", trust.level);
     const age = telemetry.news.age(now);

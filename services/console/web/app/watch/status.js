@@ -58,7 +58,7 @@ export class LossesPanel {
     });
     this.note = h("p", { class: "quiet small" }, t("loss.ground"));
     this.list = h("ul", { class: "losses" }, this.rows.map((row) => row.element));
-    this.element = h("details", { class: "panel losses-panel" }, h("summary", {}, icon("shield"), h("h2", {}, t("loss.name"))), this.note, this.list);
+    this.element = h("details", { class: "panel losses-panel", open: matchMedia("(min-width: 1900px)").matches }, h("summary", {}, icon("shield"), h("h2", {}, t("loss.name"))), this.note, this.list);
   }
   update() {
     const { pilot } = this.session;

@@ -49,8 +49,8 @@ export function watchView(drone, { account, drones }) {
   plan.tools.prepend(layersMenu(session));
   const veil = h("p", { class: "veil", role: "status" });
   const stage = h("div", { class: "stage" }, plan.element, situation.element, veil);
-  const side = h("div", { class: "side" }, manualPlace, video.element, gauges.element);
-  const more = h("div", { class: "more" }, round.element, polar.element, losses.element, events.element);
+  const side = h("div", { class: "side" }, manualPlace, video.element, gauges.element, polar.element, losses.element);
+  const more = h("div", { class: "more" }, round.element, events.element);
   const tabs = ["plan", "video", "round", "log"].map((name) => h("button", { type: "button", onclick: () => setTab(name) }, t(`tab.${name}`)));
   const tabBar = h("div", { class: "segments tabs", role: "group", "aria-label": t("tab.name") }, tabs);
   const element = h("div", { class: "watch", data: { tab: "plan" } }, alarm.element, tabBar, stage, h("div", { class: "column" }, side, more), dock.element);
@@ -68,6 +68,7 @@ export function watchView(drone, { account, drones }) {
       manualPlace.replaceChildren(manual.element);
       manual.take.focus({ preventScroll: true });
       setTab("plan");
+      plan.setFollow(true);
     } else {
       manual?.end();
       manual = null;

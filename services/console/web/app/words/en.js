@@ -214,7 +214,7 @@ export default {
   "layer.grid": "Certainty grid",
   "layer.polar": "Polar histogram",
 
-  "layer_hint.seen": "lit as by a lamp",
+  "layer_hint.seen": "brighter floor",
   "layer_hint.route": "dotted, with the places to look from",
   "layer_hint.path": "where it believes to have flown",
   "layer_hint.particles": "all places it holds possible",

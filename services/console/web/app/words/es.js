@@ -214,7 +214,7 @@ export default {
   "layer.grid": "Rejilla de certeza",
   "layer.polar": "Histograma polar",
 
-  "layer_hint.seen": "iluminado como por un farol",
+  "layer_hint.seen": "suelo más claro",
   "layer_hint.route": "punteada, con los puntos de observación",
   "layer_hint.path": "por donde cree haber volado",
   "layer_hint.particles": "todos los lugares que considera posibles",
