@@ -252,9 +252,18 @@ test("the event log tells what changed, not what was", () => {
   assert.equal(chronicle.entries.length, 4);
   chronicle.look(pilot({ phase: 7, cause: 8, action: 4, holder: "" }), patrol(3, [room(3)]), pose(), 4);
   assert.deepEqual(chronicle.entries.slice(0, 3).map((entry) => entry.key), ["event.no_holder", "event.failsafe", "phase.emergency"]);
+  const before = chronicle.entries.length;
   chronicle.ordered("home", { outcome: "refused", text: "refused: not flying" }, 5);
-  assert.equal(chronicle.entries[0].key, "event.order_refused");
-  for (let k = 0; k < 1000; k += 1) chronicle.told("x", k);
+  assert.equal(chronicle.entries.length, before, "the console tells it");
+  chronicle.ordered("home", { outcome: "unsent", text: "" }, 5);
+  assert.equal(chronicle.entries[0].key, "event.order_unsent");
+  chronicle.told({ time_ms: 77, kind: "order", text: "refused: not flying", account: "ana", verb: "home", accepted: false }, 6);
+  assert.deepEqual([chronicle.entries[0].key, chronicle.entries[0].at, chronicle.entries[0].values.verb.key], ["event.order_refused", 77, "verb.home"]);
+  for (const line of [null, "x", { kind: "phase", text: "hover" }, { kind: "failsafe", text: "lost" }]) chronicle.told(line, 7);
+  assert.equal(chronicle.entries[0].at, 77);
+  chronicle.told({ time_ms: 78, kind: "round", text: "over", report: 12 }, 8);
+  assert.equal(chronicle.entries[0].values.report, 12);
+  for (let k = 0; k < 1000; k += 1) chronicle.told({ kind: "link", text: "x" }, k);
   assert.equal(chronicle.entries.length, 300);
 });
 
@@ -277,7 +286,8 @@ test("the path begins with the flight, breaks where the place was not known, and
 });
 
 test("reports: whatever is absent is filled in", () => {
-  const report = reportOf({ id: 1, drone: "d", started_ms: 1, landed_ms: 2, outcome: "landed_on_pad", coverage: 0.9, report: { rooms: [{ name: "Hall", state: "partly seen", seen: 1.7 }, { name: "Store", state: 3 }] } });
+  const report = reportOf({ id: 1, drone: "d", started_ms: 1, landed_ms: 2, outcome: "landed_on_pad", coverage: 0.9, rooms: [{ name: "Hall", state: "partly seen", seen: 1.7 }, { name: "Store", state: 3 }], flown_by: [{ time_ms: 5, text: "ana" }] });
+  assert.deepEqual(report.flown_by, [{ time_ms: 5, ended_ms: null, text: "ana", action: "" }]);
   assert.deepEqual(report.rooms.map((room) => [room.state, room.seen]), [["partly", 1], ["skipped", 0]]);
   assert.deepEqual(report.incidents, []);
   assert.equal(outcomeOf("landed on pad").tone, "good");

@@ -1,5 +1,9 @@
 // A WebSocket that comes back: after 0.5 s, doubling to 8 s, at once when the page is seen or the network returns.
 
+/** Close codes of the console: the session is over, or this drone is no longer for this account. */
+const LOGGED_OUT = 4401;
+const NOT_ALLOWED = 4403;
+
 export class Socket {
   /** `handlers`: open(), text(string), binary(ArrayBuffer), closed(). */
   constructor(url, handlers) {
@@ -34,11 +38,16 @@ export class Socket {
       if (typeof event.data === "string") this.handlers.text?.(event.data);
       else this.handlers.binary?.(event.data);
     };
-    socket.onclose = () => {
+    socket.onclose = ({ code }) => {
       if (this.socket !== socket) return;
       this.socket = null;
       if (this.ended) return;
       this.handlers.closed?.();
+      if (code === LOGGED_OUT || code === NOT_ALLOWED) {
+        this.ended = true;
+        dispatchEvent(new Event("sereno:session"));
+        return;
+      }
       this.timer = setTimeout(() => this.connect(), this.wait);
       this.wait = Math.min(this.wait * 2, 8000);
     };

@@ -49,15 +49,20 @@ export class Chronicle {
       this.add(at, "room", room.state === "seen" ? "ok" : "caution", `event.room_${room.state}`, { room: room.name, reason: { sentence: room.reason } });
     }
   }
-  ordered(verb, { outcome, text }, at) {
-    this.add(at, "order", outcome === "accepted" ? "lamp" : "caution", `event.order_${outcome}`, { verb: { key: `verb.${verb}` }, text: { sentence: text } });
+  /** An order of one's own that never got through; what came of all others the console tells everybody. */
+  ordered(verb, { outcome }, at) {
+    if (outcome === "unsent" || outcome === "unanswered") this.add(at, "order", "caution", `event.order_${outcome}`, { verb: { key: `verb.${verb}` } });
   }
-  /** A line from the console: {text, account?, drone?, time_ms?} or a bare sentence. */
+  /** A line of the console, {time_ms, kind, text, account?, verb?, accepted?, report?}. Phases and failsafes are seen here already. */
   told(line, at) {
-    const text = typeof line === "string" ? line : line.text ?? line.answer ?? "";
-    const who = typeof line === "string" ? "" : line.account ?? "";
-    const verb = typeof line === "object" && line.verb ? { key: `verb.${line.verb}` } : "";
-    if (!text && !verb) return;
-    this.add(line.time_ms ?? at, "told", line.tone ?? "info", verb ? "event.told_verb" : who ? "event.told_by" : "event.told", { who, verb, text: { sentence: text } });
+    if (line === null || typeof line !== "object" || line.kind === "phase" || line.kind === "failsafe") return;
+    const when = Number.isFinite(line.time_ms) ? line.time_ms : at;
+    const values = { who: line.account ?? "", text: { sentence: String(line.text ?? "") } };
+    if (line.kind === "order") {
+      const key = line.accepted ? "event.order_accepted" : "event.order_refused";
+      this.add(when, "order", line.accepted ? "lamp" : "caution", key, { ...values, verb: { key: `verb.${line.verb}` } });
+    } else if (line.kind === "incident") this.add(when, "incident", "caution", "event.incident", values);
+    else if (Number.isFinite(line.report)) this.add(when, "report", "ok", "event.report", { ...values, report: line.report });
+    else this.add(when, "told", line.kind === "link" ? "caution" : "info", "event.told", values);
   }
 }

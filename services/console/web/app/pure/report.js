@@ -31,9 +31,13 @@ function roomOf(room) {
   };
 }
 
+/** Something with a beginning and an end; `action` is what a failsafe did. */
+function spanOf(one) {
+  return { time_ms: one.time_ms ?? null, ended_ms: one.ended_ms ?? null, text: one.text ?? "", action: one.action ?? "" };
+}
+
 export function reportOf(value) {
-  const inner = value?.report && typeof value.report === "object" ? value.report : {};
-  const report = { ...inner, ...value };
+  const report = value ?? {};
   return {
     drone: report.drone ?? "",
     started_ms: report.started_ms ?? null,
@@ -43,6 +47,8 @@ export function reportOf(value) {
     text: report.text ?? "",
     rooms: list(report.rooms, "rooms").map(roomOf),
     incidents: list(report.incidents, "incidents").map((one) => ({ time_ms: one.time_ms, text: one.text ?? "", account: one.account ?? "", x_m: one.x_m ?? null, y_m: one.y_m ?? null })),
-    failsafes: list(report.failsafes, "failsafes").map((one) => (typeof one === "string" ? { time_ms: null, text: one } : { time_ms: one.time_ms ?? null, text: one.text ?? one.cause ?? "" })),
+    failsafes: list(report.failsafes).map(spanOf),
+    flown_by: list(report.flown_by).map(spanOf),
+    silences: list(report.silences).map(spanOf),
   };
 }

@@ -64,7 +64,7 @@ export function menu(opener, items, more = {}) {
   };
   addEventListener("pointerdown", away);
   list.addEventListener("click", (event) => {
-    if (event.target.closest("a, button")) set(false);
+    if (event.target.closest("a, button") && !event.target.closest(".bar-choices")) set(false);
   });
   return element;
 }
@@ -81,7 +81,7 @@ export function frame(name, session, view, actions) {
   const opener = h("button", { type: "button", class: "icon-button", "aria-label": t("app.account"), title: t("app.account") }, h("span", { class: "avatar", "aria-hidden": "true" }, initials(account)));
   const narrowLinks = h("div", { class: "only-narrow" }, links(session).map((link) => navLink(link, name)));
   const list = menu(opener, [
-    who, narrowLinks,
+    who, h("div", { class: "bar-choices only-narrow" }, languageSwitch(), themeButton()), narrowLinks,
     h("a", { class: "nav-link", href: "#/password" }, icon("key"), h("span", {}, t("nav.password"))),
     button(t("nav.logout"), "out", { onclick: actions.out }),
   ]);
@@ -95,6 +95,6 @@ export function frame(name, session, view, actions) {
       view.bar ?? null,
       h("div", { class: "gap" }),
       h("nav", { class: "only-wide", "aria-label": t("nav.name") }, h("ul", {}, links(session).map((link) => h("li", {}, navLink(link, name))))),
-      languageSwitch(), themeButton(), list),
+      h("div", { class: "bar-choices only-wide" }, languageSwitch(), themeButton()), list),
     h("main", { id: "view", tabindex: "-1" }, view.element));
 }

@@ -63,6 +63,15 @@ function roomRow(room) {
     h("td", { "data-name": t("reports.reason") }, room.reason ? sentence(room.reason) : ""));
 }
 
+/** A heading with what lasted for a while below it; nothing when nothing did. */
+function spans(title, list) {
+  if (list.length === 0) return null;
+  return [h("h2", {}, title), h("ul", { class: "incidents" }, list.map((line) => h("li", {},
+    h("time", {}, timeOfDay(line.time_ms)),
+    h("div", {}, h("strong", {}, [line.text, line.action].filter(Boolean).map((words) => sentence(words)).join(": ")),
+      h("span", { class: "quiet" }, line.ended_ms ? t("report.for", { time: clock((line.ended_ms - line.time_ms) / 1000) }) : t("report.to_the_end"))))))];
+}
+
 function paper(report) {
   return [
     h("header", { class: "paper-head" },
@@ -84,7 +93,9 @@ function paper(report) {
       ? h("ol", { class: "incidents" }, report.incidents.map((incident) => h("li", {}, h("time", {}, timeOfDay(incident.time_ms)), h("div", {}, h("strong", {}, incident.text || t("report.incident")),
           h("span", { class: "quiet" }, [incident.account, incident.x_m === null ? "" : t("report.at", { x: number(incident.x_m, 1), y: number(incident.y_m, 1) })].filter(Boolean).join(" · "))))))
       : h("p", { class: "quiet" }, t("report.no_incidents")),
-    report.failsafes.length > 0 ? [h("h2", {}, t("report.failsafes")), h("ul", { class: "incidents" }, report.failsafes.map((line) => h("li", {}, h("time", {}, line.time_ms ? timeOfDay(line.time_ms) : ""), h("div", {}, sentence(line.text)))))] : null,
+    spans(t("report.failsafes"), report.failsafes),
+    spans(t("report.flown_by"), report.flown_by),
+    spans(t("report.silences"), report.silences),
   ];
 }
 

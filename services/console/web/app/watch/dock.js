@@ -147,7 +147,6 @@ export class DockPanel {
       h("label", { class: "field" }, h("span", {}, t("incident.what")), h("textarea", { class: "input", name: "text", rows: 3, maxlength: 1000, autofocus: true })),
     ], t("incident.keep"), async ({ text }) => {
       await api.markIncident(this.session.drone, text.trim());
-      this.session.chronicle.add(Date.now(), "incident", "caution", "event.incident", { text: text.trim() });
       close();
     }, [button(t("app.cancel"), null, { class: "plain", onclick: close })]));
   }

@@ -47,7 +47,8 @@ export function drawGround(view, seen) {
   const patrol = session.patrol;
   if (patrol && session.layers.has("seen") && patrol.seen_cell_m > 0) {
     const image = seen.make(patrol, palette.lit);
-    if (image) {
+    if (!image) drawSeenRooms(view, patrol);
+    else {
       const size = image.width * patrol.seen_cell_m * projection.scale;
       context.save();
       context.imageSmoothingEnabled = true;
@@ -59,6 +60,25 @@ export function drawGround(view, seen) {
   ground.place(context, projection, ratio);
   context.fillStyle = palette.wall;
   context.fill(ground.walls);
+  context.restore();
+}
+
+/** Without the bitmap of seen cells each room is lit by its share. */
+function drawSeenRooms(view, patrol) {
+  const { context, projection, palette, ground, ratio, session } = view;
+  const shares = new Map((patrol.rooms ?? []).slice(0, patrol.rooms_used).map((room) => [room.name, room.seen]));
+  context.save();
+  ground.place(context, projection, ratio);
+  context.clip(ground.floor);
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.fillStyle = palette.lit;
+  for (const room of session.about?.rooms ?? []) {
+    const share = shares.get(room.name) ?? 0;
+    if (share <= 0) continue;
+    context.globalAlpha = share;
+    outline(context, projection, room);
+    context.fill();
+  }
   context.restore();
 }
 

@@ -35,7 +35,8 @@ export class PlanPanel {
     this.gridImage = new GridImage();
     this.target = null;
     this.asking = null;
-    this.fitted = false;
+    /** Pixels at the top that something else lies over. */
+    this.above = () => 0;
     this.following = false;
     this.pointers = new Map();
     this.dirty = true;
@@ -87,7 +88,7 @@ export class PlanPanel {
     const { ground, projection, em } = this.view;
     if (!ground) return;
     const tall = projection.height > projection.width;
-    projection.fit(ground.box, { top: (tall ? 7.2 : 8) * em, right: tall ? 1 * em : 4.6 * em, bottom: (tall ? 4 : 2.2) * em, left: (tall ? 1 : 1.6) * em });
+    projection.fit(ground.box, { top: tall ? this.above() + em : 8 * em, right: tall ? 1 * em : 4.6 * em, bottom: (tall ? 4 : 2.2) * em, left: (tall ? 1 : 1.6) * em });
     projection.least = projection.scale * 0.5;
     this.touched = false;
     this.setFollow(false);

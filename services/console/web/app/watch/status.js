@@ -129,7 +129,8 @@ export class EventsPanel {
     show(this.none, entries.length === 0);
     if (count === this.drawn) return;
     this.drawn = count;
-    fill(this.rows, entries.slice(0, 120).map(({ at, tone, key, values }) => h("li", { data: { tone } }, h("time", {}, timeOfDay(at)), h("span", {}, t(key, valuesOf(values)).replace(/: $|\s·\s*$/, "")))));
+    fill(this.rows, entries.slice(0, 120).map(({ at, tone, key, values }) => h("li", { data: { tone } }, h("time", {}, timeOfDay(at)),
+      h("span", {}, t(key, valuesOf(values)).replace(/: $/, ""), values.report ? [" ", h("a", { href: `#/reports/${values.report}` }, t("events.report"))] : null))));
   }
 }
 

@@ -47,6 +47,7 @@ export function watchView(drone, { account, drones }) {
   let manual = null;
 
   plan.tools.prepend(layersMenu(session));
+  plan.above = () => situation.element.offsetTop + situation.element.offsetHeight;
   const veil = h("p", { class: "veil", role: "status" });
   const stage = h("div", { class: "stage" }, plan.element, situation.element, veil);
   const side = h("div", { class: "side" }, manualPlace, video.element, gauges.element, polar.element, losses.element);

@@ -125,6 +125,10 @@ export default {
   "report.incident": "Incident",
   "report.no_incidents": "No incidents were marked.",
   "report.failsafes": "Failsafes",
+  "report.flown_by": "Flown by hand",
+  "report.silences": "Not heard",
+  "report.for": "for {time} min",
+  "report.to_the_end": "to the end",
   "report.at": "at {x} m, {y} m",
   "report.print": "Print",
 
@@ -327,14 +331,16 @@ export default {
   "event.room_seen": "{room}: seen",
   "event.room_skipped": "{room} skipped: {reason}",
   "event.room_partly": "{room} seen in part: {reason}",
-  "event.order_accepted": "{verb}: accepted",
-  "event.order_refused": "{verb}: {text}",
+  "event.order_accepted": "{verb} ({who})",
+  "event.order_refused": "{verb} ({who}): {text}",
   "event.order_unsent": "{verb}: not sent, no connection",
   "event.order_unanswered": "{verb}: no answer",
-  "event.incident": "Incident marked: {text}",
+
+  "events.report": "Open it",
+
+  "event.incident": "Incident ({who}): {text}",
+  "event.report": "The report of the round is ready.",
   "event.told": "{text}",
-  "event.told_by": "{who}: {text}",
-  "event.told_verb": "{who} · {verb}: {text}",
 
   "verb.takeoff": "Take off",
   "verb.land": "Land",

@@ -125,6 +125,10 @@ export default {
   "report.incident": "Incidencia",
   "report.no_incidents": "No se marcó ninguna incidencia.",
   "report.failsafes": "Protecciones",
+  "report.flown_by": "Pilotado a mano",
+  "report.silences": "Sin noticias",
+  "report.for": "durante {time} min",
+  "report.to_the_end": "hasta el final",
   "report.at": "en {x} m; {y} m",
   "report.print": "Imprimir",
 
@@ -327,14 +331,16 @@ export default {
   "event.room_seen": "{room}: vista",
   "event.room_skipped": "{room} omitida: {reason}",
   "event.room_partly": "{room} vista en parte: {reason}",
-  "event.order_accepted": "{verb}: aceptado",
-  "event.order_refused": "{verb}: {text}",
+  "event.order_accepted": "{verb} ({who})",
+  "event.order_refused": "{verb} ({who}): {text}",
   "event.order_unsent": "{verb}: no enviado, sin conexión",
   "event.order_unanswered": "{verb}: sin respuesta",
-  "event.incident": "Incidencia marcada: {text}",
+
+  "events.report": "Abrirlo",
+
+  "event.incident": "Incidencia ({who}): {text}",
+  "event.report": "El informe de la ronda está listo.",
   "event.told": "{text}",
-  "event.told_by": "{who}: {text}",
-  "event.told_verb": "{who} · {verb}: {text}",
 
   "verb.takeoff": "Despegar",
   "verb.land": "Aterrizar",
