@@ -32,4 +32,7 @@ impl<const N: usize> Field for Bytes<N> {
     fn write_json(&self, out: &mut dyn Write) -> fmt::Result {
         write!(out, "\"{N} bytes\"")
     }
+    fn write_schema(out: &mut dyn Write) -> fmt::Result {
+        write!(out, "{{\"const\":\"{N} bytes\"}}")
+    }
 }

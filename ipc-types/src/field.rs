@@ -12,6 +12,31 @@ pub trait Field: bytemuck::Pod {
     /// # Errors
     /// Only what `out` itself reports.
     fn write_json(&self, out: &mut dyn Write) -> fmt::Result;
+
+    /// Writes the JSON schema (draft 2020-12) of what [`Field::write_json`] writes, with each field's line of
+    /// documentation as its description.
+    ///
+    /// # Errors
+    /// Only what `out` itself reports.
+    fn write_schema(out: &mut dyn Write) -> fmt::Result;
+}
+
+/// Writes lines of documentation as one JSON string.
+pub(crate) fn write_description(lines: &[&str], out: &mut dyn Write) -> fmt::Result {
+    out.write_char('"')?;
+    for (index, line) in lines.iter().enumerate() {
+        if index > 0 {
+            out.write_char(' ')?;
+        }
+        for c in line.trim().chars() {
+            match c {
+                '"' => out.write_str("\\\"")?,
+                '\\' => out.write_str("\\\\")?,
+                c => out.write_char(c)?,
+            }
+        }
+    }
+    out.write_char('"')
 }
 
 const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
@@ -49,6 +74,9 @@ macro_rules! integer_field {
             fn write_json(&self, out: &mut dyn Write) -> fmt::Result {
                 write!(out, "{self}")
             }
+            fn write_schema(out: &mut dyn Write) -> fmt::Result {
+                write!(out, "{{\"type\":\"integer\",\"minimum\":{},\"maximum\":{}}}", <$t>::MIN, <$t>::MAX)
+            }
         }
     )*};
 }
@@ -60,6 +88,9 @@ macro_rules! float_field {
             const LAYOUT: u64 = layout_of_name(stringify!($t));
             fn write_json(&self, out: &mut dyn Write) -> fmt::Result {
                 if self.is_finite() { write!(out, "{self}") } else { out.write_str("null") }
+            }
+            fn write_schema(out: &mut dyn Write) -> fmt::Result {
+                out.write_str("{\"type\":[\"number\",\"null\"]}")
             }
         }
     )*};
@@ -78,20 +109,25 @@ impl<T: Field, const N: usize> Field for [T; N] {
         }
         out.write_char(']')
     }
+    fn write_schema(out: &mut dyn Write) -> fmt::Result {
+        out.write_str("{\"type\":\"array\",\"items\":")?;
+        T::write_schema(out)?;
+        write!(out, ",\"minItems\":{N},\"maxItems\":{N}}}")
+    }
 }
 
 /// Defines a structure that may stand in a message.
 macro_rules! fields {
     (
-        $(#[$meta:meta])*
+        $(#[doc = $doc:literal])*
         pub struct $name:ident {
-            $( $(#[$fmeta:meta])* pub $field:ident : $ty:ty, )*
+            $( $(#[doc = $fdoc:literal])* pub $field:ident : $ty:ty, )*
         }
     ) => {
-        $(#[$meta])*
+        $(#[doc = $doc])*
         #[repr(C)]
         #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
-        pub struct $name { $( $(#[$fmeta])* pub $field: $ty, )* }
+        pub struct $name { $( $(#[doc = $fdoc])* pub $field: $ty, )* }
 
         impl $crate::Field for $name {
             const LAYOUT: u64 = {
@@ -115,6 +151,35 @@ macro_rules! fields {
                 )*
                 out.write_str(if first { "{}" } else { "}" })
             }
+            fn write_schema(out: &mut dyn core::fmt::Write) -> core::fmt::Result {
+                write!(out, "{{\"title\":\"{}\",\"description\":", stringify!($name))?;
+                $crate::field::write_description(&[$($doc),*], out)?;
+                out.write_str(",\"type\":\"object\",\"additionalProperties\":false,\"properties\":{")?;
+                let mut first = true;
+                $(
+                    if !stringify!($field).starts_with("reserved") {
+                        out.write_str(if first { "\"" } else { ",\"" })?;
+                        first = false;
+                        out.write_str(concat!(stringify!($field), "\":{\"description\":"))?;
+                        $crate::field::write_description(&[$($fdoc),*], out)?;
+                        // Beside a description, so that what is inside keeps its own.
+                        out.write_str(",\"allOf\":[")?;
+                        <$ty as $crate::Field>::write_schema(out)?;
+                        out.write_str("]}")?;
+                    }
+                )*
+                out.write_str("},\"required\":[")?;
+                let mut more = false;
+                $(
+                    if !stringify!($field).starts_with("reserved") {
+                        out.write_str(if more { ",\"" } else { "\"" })?;
+                        more = true;
+                        out.write_str(concat!(stringify!($field), "\""))?;
+                    }
+                )*
+                let _ = (first, more);
+                out.write_str("]}")
+            }
         }
 
         impl Default for $name {
@@ -130,13 +195,13 @@ pub(crate) use fields;
 /// Defines a message: a structure whose first field is `header: Header`, and its topic.
 macro_rules! message {
     (
-        $(#[$meta:meta])*
+        $(#[doc = $doc:literal])*
         pub struct $name:ident on $topic:literal {
             $($body:tt)*
         }
     ) => {
         $crate::field::fields! {
-            $(#[$meta])*
+            $(#[doc = $doc])*
             pub struct $name {
                 /// Who said this and when.
                 pub header: $crate::Header,

@@ -80,6 +80,10 @@ impl<const N: usize> Field for Text<N> {
         }
         out.write_char('"')
     }
+    fn write_schema(out: &mut dyn Write) -> fmt::Result {
+        // `maxLength` counts characters, of which there are no more than bytes.
+        write!(out, "{{\"type\":\"string\",\"maxLength\":{N}}}")
+    }
 }
 
 #[cfg(test)]

@@ -78,6 +78,11 @@ impl Field for Runs {
         }
         out.write_char(']')
     }
+    fn write_schema(out: &mut dyn Write) -> fmt::Result {
+        out.write_str("{\"type\":\"array\",\"items\":")?;
+        Run::write_schema(out)?;
+        write!(out, ",\"maxItems\":{MAX_RUNS}}}")
+    }
 }
 
 message! {
