@@ -5,8 +5,8 @@ import { t } from "../words/text.js";
 
 let count = 0;
 
-/** Opens a dialog; `make(close)` gives its inside. */
-export function openDialog(title, make) {
+/** Opens a dialog; `make(close)` gives its inside. One that is not modal leaves the page, and so the stop button, in reach. */
+export function openDialog(title, make, { modal = true } = {}) {
   count += 1;
   const id = `dialog-${count}`;
   const dialog = h("dialog", { "aria-labelledby": id });
@@ -17,7 +17,15 @@ export function openDialog(title, make) {
   );
   dialog.addEventListener("close", () => dialog.remove());
   document.body.append(dialog);
-  dialog.showModal();
+  if (modal) dialog.showModal();
+  else {
+    dialog.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape") return;
+      event.stopPropagation();
+      close();
+    });
+    dialog.show();
+  }
   dialog.querySelector("input:not([type=hidden]), select, textarea")?.focus();
   return close;
 }

@@ -148,7 +148,7 @@ export class DockPanel {
     ], t("incident.keep"), async ({ text }) => {
       await api.markIncident(this.session.drone, text.trim());
       close();
-    }, [button(t("app.cancel"), null, { class: "plain", onclick: close })]));
+    }, [button(t("app.cancel"), null, { class: "plain", onclick: close })]), { modal: false });
   }
   update() {
     if (!this.session.mayOrder) return;

@@ -197,9 +197,9 @@ export function drawPad(view) {
   context.restore();
 }
 
-export function drawScale(view, right, bottom) {
+export function drawScale(view, right, bottom, room) {
   const { context, projection, palette, em } = view;
-  const metres = scaleBar(projection.scale, 110);
+  const metres = scaleBar(projection.scale, room);
   const width = metres * projection.scale;
   context.save();
   context.strokeStyle = palette.text2;

@@ -61,6 +61,7 @@ export class ManualPanel {
     const refused = control.answer && control.answer.outcome !== "accepted" && !lease;
     show(this.trouble, Boolean(refused));
     if (refused) setText(this.trouble, sentence(control.answer.text) || t(`answer.${control.answer.outcome}`));
+    if (lease && this.element.dataset.lease === "false" && this.element.contains(document.activeElement)) this.hold.focus({ preventScroll: true });
     setData(this.element, "lease", lease);
     setData(this.hold, "live", state);
     this.showPad();

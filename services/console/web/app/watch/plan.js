@@ -84,11 +84,19 @@ export class PlanPanel {
     if (!this.touched) this.fit();
     this.dirty = true;
   }
+  /** Where the tools lie below and not beside the plan. */
+  get narrow() {
+    return matchMedia("(max-width: 600px)").matches;
+  }
+  /** What lies over the plan has changed its size. */
+  refit() {
+    if (!this.touched) this.fit();
+  }
   fit() {
     const { ground, projection, em } = this.view;
     if (!ground) return;
-    const tall = projection.height > projection.width;
-    projection.fit(ground.box, { top: tall ? this.above() + em : 8 * em, right: tall ? 1 * em : 4.6 * em, bottom: (tall ? 4 : 2.2) * em, left: (tall ? 1 : 1.6) * em });
+    const { narrow } = this;
+    projection.fit(ground.box, { top: this.above() + 0.8 * em, right: (narrow ? 1 : 4.6) * em, bottom: (narrow ? 4 : 2.2) * em, left: (narrow ? 1 : 1.6) * em });
     projection.least = projection.scale * 0.5;
     this.touched = false;
     this.setFollow(false);
@@ -248,8 +256,8 @@ export class PlanPanel {
     if (this.target) drawTarget(view, this.target, false);
     drawDrone(view, fresh === "live" || fresh === "late");
     if (this.asking?.place) drawTarget(view, this.asking.place, true);
-    const tall = projection.height > projection.width;
-    drawScale(view, projection.width - (tall ? 1.2 : 4.6) * view.em, projection.height - (tall ? 1.2 : 0.8) * view.em);
+    const { narrow } = this;
+    drawScale(view, projection.width - (narrow ? 1.2 : 4.6) * view.em, projection.height - (narrow ? 1.2 : 0.8) * view.em, narrow ? 70 : 110);
   }
   end() {
     cancelAnimationFrame(this.handle);

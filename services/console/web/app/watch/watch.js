@@ -48,6 +48,8 @@ export function watchView(drone, { account, drones }) {
 
   plan.tools.prepend(layersMenu(session));
   plan.above = () => situation.element.offsetTop + situation.element.offsetHeight;
+  const sizes = new ResizeObserver(() => plan.refit());
+  sizes.observe(situation.element);
   const veil = h("p", { class: "veil", role: "status" });
   const stage = h("div", { class: "stage" }, plan.element, situation.element, veil);
   const side = h("div", { class: "side" }, manualPlace, video.element, gauges.element, polar.element, losses.element);
@@ -108,6 +110,7 @@ export function watchView(drone, { account, drones }) {
     title: drone,
     end() {
       clearInterval(timer);
+      sizes.disconnect();
       for (const [name, handler] of listeners) session.removeEventListener(name, handler);
       removeEventListener("pointerdown", wakeSound);
       removeEventListener("keydown", wakeSound);

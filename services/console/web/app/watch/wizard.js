@@ -51,6 +51,6 @@ export function wizardDialog(control, pad) {
     timer = setInterval(work, 30);
     work();
     return body;
-  });
+  }, { modal: false });
   return close;
 }
