@@ -9,7 +9,7 @@ import { dronesView, noDroneView, troubleView } from "./view/drones.js";
 import { logView } from "./view/log.js";
 import { reportView, reportsView } from "./view/reports.js";
 import { passwordView } from "./view/password.js";
-import { watchView } from "./watch/watch.js";
+import { alarmElsewhere, endWatch, watchView } from "./watch/watch.js";
 import { begin as beginTheme } from "./view/theme.js";
 import { begin as beginLanguage } from "./view/language.js";
 import { t } from "./words/text.js";
@@ -17,6 +17,7 @@ import { t } from "./words/text.js";
 const root = document.getElementById("app");
 let session = null;
 let view = null;
+let alarm = null;
 
 /** Where the address points: #/watch/NAME, #/reports, #/reports/ID, #/accounts, #/log, #/password. */
 function route() {
@@ -45,11 +46,14 @@ function choose() {
 
 function draw() {
   view?.end?.();
+  alarm?.end();
   const chosen = choose();
   view = chosen.view;
   document.title = view.title ? `${view.title} · Sereno` : "Sereno";
   const door = chosen.name === "claim" || chosen.name === "login";
-  fill(root, door ? view.element : frame(chosen.name, session, view, { out }));
+  if (door) endWatch();
+  alarm = door || chosen.name === "watch" ? null : alarmElsewhere();
+  fill(root, door ? view.element : frame(chosen.name, session, view, alarm?.element ?? null, { out }));
   if (!door && view.focus !== false) document.getElementById("view")?.focus({ preventScroll: true });
 }
 

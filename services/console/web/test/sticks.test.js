@@ -146,6 +146,24 @@ test("nothing counts while the page is hidden, in the back, or without beacons",
   assert.equal(live.sequence, 1);
 });
 
+test("a gamepad pulled out counts for nothing until it is back or another hand moves", () => {
+  const live = new Liveness();
+  live.heardBeacon(1, 0);
+  live.newGamepad();
+  live.gamepad(5, 1);
+  live.gamepad(6, 2);
+  live.lostGamepad();
+  assert.equal(live.frozen(3), "unplugged");
+  assert.equal(live.input(3), false);
+  assert.equal(live.touched(4), true);
+  assert.equal(live.frozen(4), null);
+  live.lostGamepad();
+  live.newGamepad();
+  assert.equal(live.gamepad(7, 5), false, "its first look is no input");
+  assert.equal(live.gamepad(8, 6), true);
+  assert.equal(live.sequence, 3);
+});
+
 test("a frame says what the hand did; a block lets go of the button at once", () => {
   const live = new Liveness();
   const wish = { forward: 0.4, left: 0, up: 0, turn: -0.1, held: true, arm: "absent" };

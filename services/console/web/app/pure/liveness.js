@@ -37,6 +37,11 @@ export class Liveness {
     this.tied = { beacon_ns: this.beacon.beacon_ns, since_ms: Math.max(0, now - this.beacon.at) };
     return true;
   }
+  /** A hand moved a key or the screen: also the way on after a gamepad was pulled out. */
+  touched(now) {
+    this.unblock("unplugged");
+    return this.input(now);
+  }
   /** A look at a gamepad: input only if its own timestamp has moved since the last look. */
   gamepad(timestamp, now) {
     const before = this.timestamp;
@@ -44,9 +49,15 @@ export class Liveness {
     if (before === null || timestamp === before) return false;
     return this.input(now);
   }
-  /** The device was changed or pulled out. */
-  forgetGamepad() {
+  /** Another device, or the same one again. */
+  newGamepad() {
     this.timestamp = null;
+    this.unblock("unplugged");
+  }
+  /** The device that was flown by is gone: nothing counts until it is back or another hand moves. */
+  lostGamepad() {
+    this.timestamp = null;
+    this.block("unplugged");
   }
   /** Age of the newest input at the page, null before any. */
   age(now) {

@@ -32,6 +32,7 @@ export class Control extends EventTarget {
     this.asked = null;
     this.answer = null;
     this.wish = join([]);
+    this.held = false;
     this.guards = [
       [document, "visibilitychange", () => this.reasons()],
       [window, "blur", () => this.reasons()],
@@ -92,6 +93,10 @@ export class Control extends EventTarget {
         this.changed();
       }
     } else if (message?.answer) this.orders.answered(message.answer);
+    else if (typeof message?.error === "string") {
+      this.answer = { outcome: "refused", text: message.error };
+      this.changed();
+    }
   }
   /** Whether the drone says that this very socket holds the sticks. */
   get hasLease() {
@@ -158,8 +163,14 @@ export class Control extends EventTarget {
     const now = performance.now();
     const pad = this.pads.look(now);
     this.wish = join([pad, this.keyboard.wish, this.touch.wish]);
-    if (!this.hasLease) return;
     const held = this.wish.held && this.liveness.blocks.size === 0;
+    const pressed = held && !this.held;
+    this.held = held;
+    if (!this.hasLease) {
+      // Whoever begins to hold the button takes over; the drone stops first and waits for neutral sticks all the same.
+      if (pressed && this.asked === null && !this.otherHolder) this.take();
+      return;
+    }
     if (!this.pace.due(this.liveness.sequence, held, now)) return;
     // What the network has not taken would arrive late and all at once: newest wins, so nothing is added.
     if (this.socket.backlog > 4096) return;

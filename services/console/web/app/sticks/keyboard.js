@@ -31,7 +31,7 @@ export class Keyboard {
     event.preventDefault();
     if (down) this.down.add(event.code);
     else this.down.delete(event.code);
-    this.liveness.input(performance.now());
+    this.liveness.touched(performance.now());
     this.moved();
   }
 }

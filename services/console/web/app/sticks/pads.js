@@ -52,14 +52,14 @@ export class Pads {
       if (this.known !== null) {
         this.known = null;
         this.mapping = null;
-        this.liveness.forgetGamepad();
+        this.liveness.lostGamepad();
       }
       return null;
     }
     if (this.known !== pad.id) {
       this.known = pad.id;
       this.mapping = this.read(pad);
-      this.liveness.forgetGamepad();
+      this.liveness.newGamepad();
     }
     if (!this.mapping) return null;
     this.liveness.gamepad(pad.timestamp, now);

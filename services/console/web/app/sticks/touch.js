@@ -24,7 +24,7 @@ export class Touch {
     };
   }
   input() {
-    this.liveness.input(performance.now());
+    this.liveness.touched(performance.now());
     this.moved();
   }
   letGo() {

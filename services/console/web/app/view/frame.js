@@ -73,8 +73,8 @@ function initials(account) {
   return `${account.name?.[0] ?? ""}${account.surname?.[0] ?? ""}`.toUpperCase();
 }
 
-/** The whole frame around `view` {element, bar}. */
-export function frame(name, session, view, actions) {
+/** The whole frame around `view` {element, bar}; `alarm` is an element between bar and view, or null. */
+export function frame(name, session, view, alarm, actions) {
   const { account } = session;
   const who = h("div", { class: "menu-who" },
     h("strong", {}, `${account.name} ${account.surname}`), h("span", {}, `${account.email} · ${t(`role.${account.role}`)}`));
@@ -96,5 +96,6 @@ export function frame(name, session, view, actions) {
       h("div", { class: "gap" }),
       h("nav", { class: "only-wide", "aria-label": t("nav.name") }, h("ul", {}, links(session).map((link) => h("li", {}, navLink(link, name))))),
       h("div", { class: "bar-choices only-wide" }, languageSwitch(), themeButton()), list),
+    alarm,
     h("main", { id: "view", tabindex: "-1" }, view.element));
 }

@@ -38,16 +38,18 @@ function call() {
 }
 
 export class AlarmPanel {
-  constructor(session) {
+  /** `elsewhere`: shown in another view, with the way back. */
+  constructor(session, elsewhere = false) {
     this.session = session;
     this.words = h("div", { class: "alarm-words" });
+    const back = elsewhere ? h("a", { class: "button", href: `#/watch/${encodeURIComponent(session.drone)}` }, icon("eye"), h("span", {}, t("alarm.back"))) : null;
     this.wake = button(t("alarm.wake"), "bell", { hidden: true, onclick: wakeSound });
     this.acknowledge = button(t("alarm.acknowledge"), "bell-off", { class: "alarm-ack", onclick: () => {
       wakeSound();
       session.alarms.acknowledge();
       this.update();
     } });
-    this.element = h("div", { class: "alarm-banner", role: "alert", hidden: true }, icon("alert"), this.words, this.wake, this.acknowledge);
+    this.element = h("div", { class: "alarm-banner", role: "alert", hidden: true }, icon("alert"), this.words, back, this.wake, this.acknowledge);
     this.shown = "";
     this.next = 0;
   }

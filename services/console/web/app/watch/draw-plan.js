@@ -66,7 +66,8 @@ export function drawGround(view, seen) {
 /** Without the bitmap of seen cells each room is lit by its share. */
 function drawSeenRooms(view, patrol) {
   const { context, projection, palette, ground, ratio, session } = view;
-  const shares = new Map((patrol.rooms ?? []).slice(0, patrol.rooms_used).map((room) => [room.name, room.seen]));
+  const rooms = (patrol.rooms ?? []).slice(0, patrol.rooms_used).filter((room) => word(ROOMS, room.state) !== "skipped");
+  const shares = new Map(rooms.map((room) => [room.name, room.seen]));
   context.save();
   ground.place(context, projection, ratio);
   context.clip(ground.floor);
@@ -165,7 +166,8 @@ export function drawRooms(view) {
     const x = projection.x((box.left + box.right) / 2);
     const y = projection.y(box.top) + Math.min(((box.top - box.bottom) * projection.scale) / 2, 1.9 * view.em);
     const sign = ROOM_SIGN[state] ? `${ROOM_SIGN[state]} ` : "";
-    label(view, `${sign}${room.name}`, x, y, { color: colors[state] ?? palette.label, size: projection.scale < 22 ? 0.74 : 0.86, weight: state === "entered" ? 680 : 580, fit: width });
+    const style = { color: colors[state] ?? palette.label, size: projection.scale < 22 ? 0.74 : 0.86, weight: state === "entered" ? 680 : 580, fit: width };
+    if (!label(view, `${sign}${room.name}`, x, y, style) && sign) label(view, room.name, x, y, style);
   }
 }
 

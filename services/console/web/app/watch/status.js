@@ -127,6 +127,7 @@ export class EventsPanel {
   update() {
     const { entries, count } = this.session.chronicle;
     show(this.none, entries.length === 0);
+    show(this.rows, entries.length > 0);
     if (count === this.drawn) return;
     this.drawn = count;
     fill(this.rows, entries.slice(0, 120).map(({ at, tone, key, values }) => h("li", { data: { tone } }, h("time", {}, timeOfDay(at)),

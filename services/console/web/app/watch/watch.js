@@ -16,22 +16,39 @@ import { VideoPanel } from "./video.js";
 
 /** Panels are looked at so often, and at once when the pilot says something. */
 const LOOK_MS = 200;
-/** One watch lives on while only words or light change. */
-let kept = null;
+/** The watch goes on behind every other view: who reads a report must still hear an alarm. */
+let standing = null;
+let watched = 0;
 
 function sessionFor(drone, account) {
-  if (kept && kept.drone === drone && kept.account.id === account.id && kept.account.role === account.role) {
-    const session = kept;
-    kept = null;
-    return session;
+  const same = standing && standing.drone === drone && standing.account.id === account.id && standing.account.role === account.role;
+  if (!same) {
+    endWatch();
+    standing = new WatchSession(drone, account);
   }
-  kept?.end();
-  kept = null;
-  return new WatchSession(drone, account);
+  return standing;
+}
+
+/** Nobody watches any more: logged out, or another drone. */
+export function endWatch() {
+  standing?.end();
+  standing = null;
+}
+
+/** The alarm of the watch that goes on, for another view: {element, end}, or null without one. */
+export function alarmElsewhere() {
+  if (!standing) return null;
+  const session = standing;
+  const alarm = new AlarmPanel(session, true);
+  const update = () => alarm.update();
+  const timer = setInterval(update, LOOK_MS);
+  update();
+  return { element: alarm.element, end: () => clearInterval(timer) };
 }
 
 export function watchView(drone, { account, drones }) {
   const session = sessionFor(drone, account);
+  watched += 1;
   const plan = new PlanPanel(session);
   const situation = new SituationPanel(session);
   const alarm = new AlarmPanel(session);
@@ -117,13 +134,10 @@ export function watchView(drone, { account, drones }) {
       manual?.end();
       plan.end();
       video.end();
-      // The next view is drawn in the same turn of the loop when only words change; then this watch goes on.
-      kept = session;
+      // When only words change the next view is drawn in the same turn of the loop, and the sticks stay in hand.
+      watched -= 1;
       queueMicrotask(() => {
-        if (kept === session) {
-          kept = null;
-          session.end();
-        }
+        if (watched === 0) session.control?.finish();
       });
     },
   };

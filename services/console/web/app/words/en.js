@@ -297,6 +297,7 @@ export default {
   "alarm.elsewhere": "It did not land on the pad.",
   "alarm.elsewhere_words": "Somebody has to look for it.",
   "alarm.acknowledge": "Acknowledge",
+  "alarm.back": "To the watch",
   "alarm.wake": "Turn on sound",
 
   "round.name": "Round",
@@ -449,7 +450,7 @@ export default {
   "sticks.state.following": "It follows you",
   "sticks.state.silent": "Nothing comes from you: it hovers",
   "sticks.state.unknown": "–",
-  "sticks.hint.free": "Taking them stops the drone wherever it is.",
+  "sticks.hint.free": "Take them, or hold the button: the drone stops wherever it is.",
   "sticks.hint.other": "Taking them is possible when they are released.",
   "sticks.hint.stopping": "Then it waits for neutral sticks.",
   "sticks.hint.neutral": "It follows only from the middle on.",
