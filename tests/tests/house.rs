@@ -110,7 +110,7 @@ fn shells_keep_to_their_family() {
         ("navigation", &[][..]),
         ("pilot", &[][..]),
         ("simulator", &["rustix"][..]),
-        ("camera", &["openh264"][..]),
+        ("camera", &["openh264", "openh264-sys2"][..]),
         (
             "console",
             &[
