@@ -22,7 +22,7 @@ message! {
     pub struct Picture on "camera/picture" {
         /// When the light fell in: the middle of the exposure.
         pub capture_ns: u64,
-        /// Counts the frames of one start of the publisher, from 1.
+        /// Number of the frame; grows.
         pub frame: u64,
         /// Pixels, even, at most [`MAX_PICTURE_WIDTH`].
         pub width: u32,

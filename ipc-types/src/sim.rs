@@ -114,10 +114,24 @@ fields! {
 }
 
 message! {
-    /// What the simulated camera looks at, for the process that renders it: sent for each frame that somebody wants.
+    /// Opens the simulated camera's shutter once, from `camera`'s simulator driver.
+    pub struct Shutter on "sim/shutter" {
+        /// Counts from 1; the picture carries it back.
+        pub frame: u64,
+        /// Pixels.
+        pub width: u32,
+        /// Pixels.
+        pub height: u32,
+    }
+}
+
+message! {
+    /// What the simulated camera looks at, for the process that renders it: the answer to a shutter.
     pub struct View on "sim/view" {
         /// When the light falls in.
         pub capture_ns: u64,
+        /// The shutter's number.
+        pub frame: u64,
         /// Simulated time since the simulator started.
         pub time_s: f64,
         /// Seed of the world: the same plan, files, settings and seed give the same world.
@@ -138,9 +152,9 @@ message! {
         pub yaw_rad: f32,
         /// Filled people; more than [`MAX_PEOPLE`] is a broken message.
         pub people_used: u32,
-        /// Pixels, as wished for.
+        /// Pixels, as the shutter says.
         pub width: u32,
-        /// Pixels, as wished for.
+        /// Pixels, as the shutter says.
         pub height: u32,
         /// Always zero.
         pub reserved: u32,

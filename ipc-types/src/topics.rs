@@ -2,7 +2,7 @@
 
 use crate::{
     Attitude, Channels, Command, Echo, FlightState, FlowMotion, Grid, Health, Message, Particles, Patrol,
-    Picture, PilotState, Ping, Polar, Pose, Power, Setpoint, SignalIn, SignalOut, SonarRanges, Sticks, Trace,
+    Picture, PilotState, Ping, Polar, Pose, Power, Setpoint, Shutter, SignalIn, SignalOut, SonarRanges, Sticks, Trace,
     Truth, Video, View, Wish,
 };
 
@@ -40,6 +40,7 @@ topics!(
     Ping,
     Echo,
     Truth,
+    Shutter,
     View,
     Attitude,
     FlightState,

@@ -1,2 +1,5 @@
-//! The drone's picture: raw frames in, H.264 out, asleep while nobody watches.
-fn main() {}
+//! The camera process.
+
+fn main() -> std::process::ExitCode {
+    runtime::main::<camera::Camera>(runtime::NoDevices)
+}

@@ -1,5 +1,6 @@
 //! What the simulator may be told.
 
+use airframe::camera::Light;
 use airframe::controller::{FailsafeSettings, Firmware};
 use airframe::radio::SafetyPilot;
 use airframe::simulation::faults::Fault;
@@ -31,6 +32,8 @@ pub struct Config {
     pub dead_sonars: Vec<String>,
     /// Once in flight the drone is suddenly so far from where it was, metres, and nothing on board has felt it; 0: never.
     pub displaced_m: f64,
+    /// What the camera sees by, and what is drawn over its picture.
+    pub camera: CameraConfig,
     /// What breaks in flight, and when; kinds and keys: [`Fault`].
     pub faults: Vec<Fault>,
 }
@@ -48,10 +51,40 @@ impl Default for Config {
             charge: 1.0,
             dead_sonars: Vec::new(),
             displaced_m: 0.0,
+            camera: CameraConfig::default(),
             faults: Vec::new(),
         }
     }
 }
+
+/// The simulated camera.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CameraConfig {
+    /// `day` (the lamps of the building) or `night` (the drone's infra-red ring).
+    pub light: String,
+    /// Whether the time of capture is drawn into the corner of the picture, as a code that survives encoding.
+    pub bar_code: bool,
+}
+
+impl Default for CameraConfig {
+    fn default() -> Self {
+        Self { light: DAY.to_owned(), bar_code: false }
+    }
+}
+
+impl CameraConfig {
+    pub(crate) fn is_night(&self) -> bool {
+        self.light == NIGHT
+    }
+
+    pub(crate) fn light(&self) -> Light {
+        if self.is_night() { Light::Night } else { Light::Day }
+    }
+}
+
+const DAY: &str = "day";
+const NIGHT: &str = "night";
 
 impl Validate for Config {
     fn validate(&self) -> Result<(), ConfigError> {
@@ -71,6 +104,9 @@ impl Validate for Config {
         within("take_back_s", self.take_back_s, 0.0..=3600.0)?;
         if !FAILSAFES.contains(&self.failsafe.as_str()) {
             return Err(ConfigError::range("failsafe", &self.failsafe, FAILSAFES.join(", ")));
+        }
+        if ![DAY, NIGHT].contains(&self.camera.light.as_str()) {
+            return Err(ConfigError::range("camera.light", &self.camera.light, "day, night"));
         }
         within("displaced_m", self.displaced_m, 0.0..=20.0)?;
         within("charge", self.charge, 0.05..=1.0)
@@ -155,6 +191,13 @@ mod tests {
             (Config { receiver: "telepathy".into(), ..Config::default() }, "receiver"),
             (Config { take_back_s: -1.0, ..Config::default() }, "take_back_s"),
             (Config { failsafe: "hope".into(), ..Config::default() }, "failsafe"),
+            (
+                Config {
+                    camera: CameraConfig { light: "dusk".into(), ..CameraConfig::default() },
+                    ..Config::default()
+                },
+                "camera.light",
+            ),
             (Config { displaced_m: -1.0, ..Config::default() }, "displaced_m"),
             (Config { charge: f64::NAN, ..Config::default() }, "charge"),
         ] {

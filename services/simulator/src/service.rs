@@ -2,8 +2,10 @@
 
 use crate::{Config, build_world};
 use airframe::simulation::{PingAnswer, STEP_NS, Simulation, TruthState};
+use crate::view::fill_view;
 use ipc_types::{
-    ARM_WITH_THE_RADIO, Echo, EchoReading, FlightState, MAX_PEOPLE, PersonTruth, Ping, Text, Truth,
+    ARM_WITH_THE_RADIO, Echo, EchoReading, FlightState, MAX_PEOPLE, PersonTruth, Ping, Shutter, Text, Truth,
+    View,
 };
 use runtime::{ByteDevice, Input, Output, Ports, Service, Start, StartError};
 use std::fmt::Write;
@@ -29,6 +31,10 @@ pub struct Simulator {
     states: Input<FlightState>,
     echoes: Output<Echo>,
     truths: Output<Truth>,
+    /// The camera's shutter, and what it sees: rendered by another process, as the world must not wait for it.
+    shutters: Input<Shutter>,
+    views: Output<View>,
+    seed: u64,
     controller: Box<dyn ByteDevice>,
     flow: Option<Box<dyn ByteDevice>>,
     /// Simulated time 0 on the bus's clock; grows by what is skipped.
@@ -67,6 +73,9 @@ impl Service for Simulator {
             states: ports.input()?,
             echoes: ports.output()?,
             truths: ports.output()?,
+            shutters: ports.input()?,
+            views: ports.output()?,
+            seed: start.seed,
             controller,
             flow,
             begin_ns: None,
@@ -93,6 +102,12 @@ impl Service for Simulator {
                 fill_truth(&mut loan, &self.flight);
                 loan.send();
             }
+        }
+        if let Some(shutter) = self.shutters.latest()
+            && let Some(mut loan) = self.views.loan()
+        {
+            fill_view(&mut loan, &shutter, &self.flight, begin + self.flight.now_ns(), self.seed);
+            loan.send();
         }
     }
 

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod acoustics;
+pub mod camera;
 pub mod clutter;
 pub mod controller;
 pub mod people;

@@ -67,6 +67,19 @@ impl Person {
         self.standing <= 0.0 && !self.halted && (self.up_to.is_some() || self.way.len() > 1)
     }
 
+    /// Where the person walks, or would, radians from world x.
+    #[must_use]
+    pub fn heading(&self) -> f32 {
+        let (tx, ty) = self.way.get(self.target).copied().unwrap_or((self.x + 1.0, self.y));
+        (ty - self.y).atan2(tx - self.x)
+    }
+
+    /// From the floor to the top of the head, metres.
+    #[must_use]
+    pub fn height(&self) -> f32 {
+        self.height
+    }
+
     /// The person as a solid: a coat, and soft.
     #[must_use]
     pub fn solid(&self) -> Solid {

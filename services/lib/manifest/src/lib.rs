@@ -17,4 +17,4 @@ pub use model::{
     Criticality, Manifest, Publication, Restart, RestartPolicy, ServiceEntry, Subscription, System,
     ToolEntry, Topic,
 };
-pub use vehicle::{Battery, Body, FlowSensor, Limits, Motors, SonarMount, Vehicle};
+pub use vehicle::{Battery, Body, CameraMount, FlowSensor, Limits, Motors, SonarMount, Vehicle};

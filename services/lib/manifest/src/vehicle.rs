@@ -117,6 +117,21 @@ pub struct FlowSensor {
     pub max_height_m: f32,
 }
 
+/// Where the camera sits and looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraMount {
+    /// Position forward of the centre of mass, metres.
+    pub x_m: f32,
+    /// Position left of the centre of mass, metres.
+    pub y_m: f32,
+    /// Position above the centre of mass, metres.
+    pub z_m: f32,
+    /// Direction above the body's plane, radians (degrees in the file).
+    pub elevation_rad: f32,
+    /// Angle from the left to the right edge of its picture, radians (degrees in the file).
+    pub field_of_view_rad: f32,
+}
+
 /// Where a sonar sits and looks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SonarMount {
@@ -171,6 +186,8 @@ pub struct Vehicle {
     pub limits: Limits,
     /// Absent on a vehicle without one.
     pub flow: Option<FlowSensor>,
+    /// Absent on a vehicle without one.
+    pub camera: Option<CameraMount>,
     /// All sonars, in the order of the file: the index is the sensor's number in messages.
     pub sonars: Vec<SonarMount>,
 }
@@ -184,6 +201,7 @@ struct RawVehicle {
     battery: Battery,
     limits: RawLimits,
     flow: Option<RawFlow>,
+    camera: Option<RawCamera>,
     #[serde(default)]
     sonar: Vec<RawSonar>,
 }
@@ -213,6 +231,23 @@ impl Default for RawFlow {
     /// small laser range finder that these boards carry.
     fn default() -> Self {
         Self { rate_hz: 25.0, count_deg: 0.12, yaw_deg: 0.0, min_height_m: 0.08, max_height_m: 4.0 }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawCamera {
+    x_m: f32,
+    y_m: f32,
+    z_m: f32,
+    elevation_deg: f32,
+    field_of_view_deg: f32,
+}
+
+impl Default for RawCamera {
+    /// Raspberry Pi camera module 2 (the thesis's NoIR is one): 62.2 degrees across, by its data sheet.
+    fn default() -> Self {
+        Self { x_m: 0.0, y_m: 0.0, z_m: 0.0, elevation_deg: 0.0, field_of_view_deg: 62.2 }
     }
 }
 
@@ -308,6 +343,13 @@ impl RawVehicle {
                 min_height_m: f.min_height_m,
                 max_height_m: f.max_height_m,
             }),
+            camera: self.camera.map(|c| CameraMount {
+                x_m: c.x_m,
+                y_m: c.y_m,
+                z_m: c.z_m,
+                elevation_rad: c.elevation_deg.to_radians(),
+                field_of_view_rad: c.field_of_view_deg.to_radians(),
+            }),
             sonars: sonars.collect(),
         }
     }
@@ -376,6 +418,14 @@ impl Check<'_> {
             self.within("flow.yaw_deg", flow.yaw_deg, -360.0, 360.0)?;
             self.within("flow.min_height_m", flow.min_height_m, 0.0, 0.5)?;
             self.within("flow.max_height_m", flow.max_height_m, 1.0, 10.0)?;
+        }
+        if let Some(camera) = &v.camera {
+            self.within("camera.x_m", camera.x_m, -v.body.radius_m, v.body.radius_m)?;
+            self.within("camera.y_m", camera.y_m, -v.body.radius_m, v.body.radius_m)?;
+            self.within("camera.z_m", camera.z_m, -v.body.height_m, v.body.height_m)?;
+            self.within("camera.elevation_deg", camera.elevation_deg, -90.0, 90.0)?;
+            // From a long lens to as wide as a flat picture can show without the corners running away.
+            self.within("camera.field_of_view_deg", camera.field_of_view_deg, 20.0, 120.0)?;
         }
         if v.sonar.len() > 16 {
             // The messages carry at most this many readings.

@@ -166,6 +166,11 @@ impl World {
         best
     }
 
+    /// The solids that may stand at a place: all that reach into its square of the index.
+    pub(crate) fn solids_at(&self, x: f32, y: f32) -> impl Iterator<Item = &Solid> {
+        self.solid_index.at(x, y).iter().filter_map(|id| self.solids.get(*id as usize))
+    }
+
     /// Height of the highest surface under a point, carpets included: what the down sonar sees and what a
     /// landing lands on. The floor is 0.
     #[must_use]
