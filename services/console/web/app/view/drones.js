@@ -11,8 +11,18 @@ export function empty(iconName, title, words, ...more) {
 
 export function noDroneView(session) {
   const words = t(session.account.role === "administrator" ? "none.words_administrator" : "none.words");
-  const again = button(t("none.again"), null, { class: "primary", onclick: () => dispatchEvent(new Event("sereno:session")) });
-  return { element: h("div", { class: "page" }, h("div", { class: "card" }, empty("drone", t("none.title"), words, again))), title: t("none.title") };
+  const look = () => dispatchEvent(new Event("sereno:session"));
+  const again = button(t("none.again"), null, { class: "primary", onclick: look });
+  // A drone that comes into reach, or is assigned, shows itself.
+  const timer = setInterval(async () => {
+    const now = await api.session().catch(() => null);
+    if (now && (!now.account || now.drones.length > 0)) look();
+  }, 5000);
+  return {
+    element: h("div", { class: "page" }, h("div", { class: "card" }, empty("drone", t("none.title"), words, again))),
+    title: t("none.title"),
+    end: () => clearInterval(timer),
+  };
 }
 
 export function troubleView(again) {

@@ -105,6 +105,13 @@ export default [
   ["navigation {what}", "navegación: {what}"],
   ["pilot {what}", "piloto: {what}"],
   // The console and the bridge.
+  ["accepted: {text}", "aceptado: {text}"],
+  ["add", "añadir"],
+  ["change", "modificar"],
+  ["claim", "dar de alta"],
+  ["log-in", "iniciar sesión"],
+  ["password", "contraseña"],
+  ["{email} as {role}", "{email} como {role}"],
   ["log in first", "inicie sesión primero"],
   ["the same order came before", "esta orden ya se había recibido"],
   ["e-mail or password is wrong", "el correo o la contraseña no son correctos"],
