@@ -263,6 +263,7 @@ test("the event log tells what changed, not what was", () => {
   assert.equal(chronicle.entries[0].at, 77);
   chronicle.told({ time_ms: 78, kind: "round", text: "over", report: 12 }, 8);
   assert.equal(chronicle.entries[0].values.report, 12);
+  assert.equal(chronicle.report, 12);
   for (let k = 0; k < 1000; k += 1) chronicle.told({ kind: "link", text: "x" }, k);
   assert.equal(chronicle.entries.length, 300);
 });

@@ -10,6 +10,8 @@ export class Chronicle {
     this.entries = [];
     this.count = 0;
     this.before = null;
+    /** Number of the newest report that was written while this page looked on; null before any. */
+    this.report = null;
   }
   add(at, kind, tone, key, values = {}) {
     this.count += 1;
@@ -62,7 +64,9 @@ export class Chronicle {
       const key = line.accepted ? "event.order_accepted" : "event.order_refused";
       this.add(when, "order", line.accepted ? "lamp" : "caution", key, { ...values, verb: { key: `verb.${line.verb}` } });
     } else if (line.kind === "incident") this.add(when, "incident", "caution", "event.incident", values);
-    else if (Number.isFinite(line.report)) this.add(when, "report", "ok", "event.report", { ...values, report: line.report });
-    else this.add(when, "told", line.kind === "link" ? "caution" : "info", "event.told", values);
+    else if (Number.isFinite(line.report)) {
+      this.report = line.report;
+      this.add(when, "report", "ok", "event.report", { ...values, report: line.report });
+    } else this.add(when, "told", line.kind === "link" ? "caution" : "info", "event.told", values);
   }
 }

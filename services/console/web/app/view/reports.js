@@ -8,7 +8,7 @@ import { clock } from "../pure/age.js";
 import { list } from "../pure/lists.js";
 import { outcomeOf, reportOf } from "../pure/report.js";
 import { sentence } from "../words/sentences.js";
-import { moment, number, t, timeOfDay } from "../words/text.js";
+import { capital, moment, number, t, timeOfDay } from "../words/text.js";
 
 const TONE = { good: "ok", caution: "caution", alarm: "alarm" };
 
@@ -83,7 +83,7 @@ function paper(report) {
       figure(t("report.landed"), moment(report.landed_ms)),
       figure(t("reports.length"), `${clock((report.landed_ms - report.started_ms) / 1000)} min`),
       figure(t("reports.coverage"), `${number(100 * report.coverage)} %`)),
-    report.text ? h("p", { class: "quiet" }, sentence(report.text)) : null,
+    report.text ? h("p", { class: "quiet" }, capital(sentence(report.text))) : null,
     h("h2", {}, t("report.rooms")),
     report.rooms.length > 0
       ? h("table", { class: "table" }, h("thead", {}, h("tr", {}, [t("reports.room"), t("reports.state"), t("reports.coverage"), t("reports.times"), t("reports.reason")].map((words) => h("th", { scope: "col" }, words)))), h("tbody", {}, report.rooms.map(roomRow)))

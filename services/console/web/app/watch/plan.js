@@ -86,7 +86,7 @@ export class PlanPanel {
   }
   /** Where the tools lie below and not beside the plan. */
   get narrow() {
-    return matchMedia("(max-width: 600px)").matches;
+    return matchMedia("(max-width: 600px), (max-height: 520px)").matches;
   }
   /** What lies over the plan has changed its size. */
   refit() {

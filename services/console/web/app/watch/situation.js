@@ -5,7 +5,7 @@ import { CAUSES, PATROL, PHASES, inFlight, word } from "../pure/codes.js";
 import { roomAt } from "../pure/rooms.js";
 import { h, icon, setData, setIcon, setText, show } from "../view/dom.js";
 import { sentence } from "../words/sentences.js";
-import { t, written } from "../words/text.js";
+import { capital, t, written } from "../words/text.js";
 
 const TRUST_ICON = { sure: "check", fair: "check", unsure: "alert", searching: "eye", lost: "alert" };
 const PHASE_ICON = { grounded: "land", arming: "takeoff", takeoff: "takeoff", hover: "pause", autonomous: "lantern", manual: "sticks", landing: "land", emergency: "alert", cut: "cut" };
@@ -94,7 +94,6 @@ export class SituationPanel {
     const round = flying && patrol && [2, 3, 4, 5, 8].includes(patrol.state) && patrol.text ? sentence(patrol.text) : "";
     const text = round || (word(CAUSES, pilot.cause) !== "none" ? "" : sentence(pilot.text ?? ""));
     const same = text.toLowerCase() === t(doing(pilot, patrol)).toLowerCase();
-    const first = (words) => words.charAt(0).toUpperCase() + words.slice(1);
-    return [room, same ? "" : first(text)].filter(Boolean).join(" · ");
+    return [room, same ? "" : capital(text)].filter(Boolean).join(" · ");
   }
 }

@@ -83,8 +83,9 @@ export class RoundPanel {
     this.bar = h("meter", { class: "round-bar", min: 0, max: 1, "aria-label": t("round.coverage") });
     this.rows = h("ol", { class: "rooms" });
     this.none = h("p", { class: "quiet small" }, t("round.none"));
+    this.report = h("a", { class: "button primary round-report", hidden: true }, icon("report"), h("span", {}, t("round.report")));
     this.element = h("section", { class: "panel round", "aria-labelledby": "round-name" },
-      h("header", { class: "panel-head" }, icon("lantern"), h("h2", { id: "round-name" }, t("round.name")), this.count), this.bar, this.none, this.rows);
+      h("header", { class: "panel-head" }, icon("lantern"), h("h2", { id: "round-name" }, t("round.name")), this.count), this.bar, this.none, this.report, this.rows);
     this.drawn = "";
   }
   update() {
@@ -92,6 +93,9 @@ export class RoundPanel {
     const rooms = (patrol?.rooms ?? []).slice(0, patrol?.rooms_used ?? 0);
     show(this.none, rooms.length === 0);
     show(this.bar, rooms.length > 0);
+    const { report } = this.session.chronicle;
+    show(this.report, report !== null && Boolean(patrol) && [0, 6, 7].includes(patrol.state));
+    if (report !== null) this.report.setAttribute("href", `#/reports/${report}`);
     const begun = patrol && patrol.state !== 0;
     const { done, all } = progress(patrol);
     const time = begun && ![6, 7].includes(patrol.state) ? secondsBetween(patrol.started_ns, patrol.header.stamp_ns) : null;

@@ -304,6 +304,7 @@ export default {
   "round.coverage": "Share of the building seen",
   "round.none": "No round has been planned yet.",
   "round.count": "{done} of {all} rooms",
+  "round.report": "Open the report of this round",
   "round.planning": "The round is being planned",
   "round.flying": "The round is being flown",
   "round.paused": "The round is paused",

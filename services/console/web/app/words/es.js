@@ -304,6 +304,7 @@ export default {
   "round.coverage": "Parte del edificio ya vista",
   "round.none": "Aún no se ha planificado ninguna ronda.",
   "round.count": "{done} de {all} salas",
+  "round.report": "Abrir el informe de esta ronda",
   "round.planning": "Se está planificando la ronda",
   "round.flying": "La ronda está en curso",
   "round.paused": "La ronda está en pausa",
