@@ -1,0 +1,2 @@
+//! The stream process.
+fn main() {}
