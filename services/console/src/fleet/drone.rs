@@ -5,7 +5,7 @@ use crate::round::{Event, Follower, News, Place};
 use axum::body::Bytes;
 use axum::extract::ws::{Message, Utf8Bytes};
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 /// Lines that a page gets when it comes.
@@ -27,7 +27,7 @@ pub struct Drone {
     pub(crate) name: Arc<str>,
     pub(super) alive: AtomicBool,
     /// The newest beacon; 0 before any.
-    pub(super) beacon_ns: AtomicU64,
+    pub(super) beacon_ns: tokio::sync::watch::Sender<u64>,
     hub: Mutex<Hub>,
     memory: Mutex<Memory>,
     /// Sockets of sticks, which get each beacon at once, with their numbers.
@@ -46,7 +46,7 @@ impl Drone {
         Self {
             name: Arc::from(name),
             alive: AtomicBool::new(false),
-            beacon_ns: AtomicU64::new(0),
+            beacon_ns: tokio::sync::watch::Sender::new(0),
             hub: Mutex::new(Hub::default()),
             memory: Mutex::new(Memory {
                 follower: Follower::new(name),
@@ -114,7 +114,7 @@ impl Drone {
 
     /// A beacon has come: on to every socket of sticks, with its number.
     pub(super) fn beacon(&self, topic: &Arc<str>, beacon_ns: u64) {
-        self.beacon_ns.store(beacon_ns, Ordering::Relaxed);
+        self.beacon_ns.send_replace(beacon_ns);
         lock(&self.sticks).retain(|(socket, page)| match page.upgrade() {
             Some(page) => {
                 let text = format!("{{\"beacon_ns\":{beacon_ns},\"socket\":{socket}}}");

@@ -157,7 +157,7 @@ impl Fleet {
             let (fleet, of) = (self.clone(), drone.clone());
             tokio::spawn(async move { fleet.about(&of).await });
         } else {
-            drone.beacon_ns.store(0, Ordering::Relaxed);
+            drone.beacon_ns.send_replace(0);
             drone.hub().forget();
         }
         let line = drone.alive_line();

@@ -5,12 +5,13 @@ use crate::app::random;
 use crate::role::Role;
 use crate::secret::hexadecimal;
 use serde::{Deserialize, Serialize};
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 use zenoh::qos::{CongestionControl, Priority};
 
 /// After this nobody waits for the drone's answer any more: an order itself lives two seconds.
 const PATIENCE: Duration = Duration::from_millis(4500);
+/// A drone that has just been found gives its first beacon within this time: they come 20 a second.
+const FIRST_BEACON: Duration = Duration::from_millis(500);
 /// Longest sentence that is taken from a drone, bytes.
 const SENTENCE: usize = 500;
 
@@ -78,10 +79,12 @@ impl Fleet {
         if (verb == "goto") != (place.0.is_some() && place.1.is_some()) {
             return Answer::refused("x_m and y_m belong to goto, both, and to nothing else");
         }
-        let beacon_ns = drone.beacon_ns.load(Ordering::Relaxed);
-        if beacon_ns == 0 || !drone.is_alive() {
-            return Answer::refused("the drone is not reached");
-        }
+        let mut beacons = drone.beacon_ns.subscribe();
+        let beacon = tokio::time::timeout(FIRST_BEACON, beacons.wait_for(|beacon_ns| *beacon_ns != 0));
+        let beacon_ns = match beacon.await {
+            Ok(Ok(beacon_ns)) if drone.is_alive() => *beacon_ns,
+            _ => return Answer::refused("the drone is not reached"),
+        };
         let Ok(id) = random::<8>() else { return Answer::refused("the system has no random numbers") };
         let payload = Payload {
             id: hexadecimal(&id),
