@@ -258,7 +258,7 @@ trait Listener: Send {
 }
 
 /// Runs both halves until one ends.
-async fn both(open: Arc<Open>, socket: WebSocket, least: Role, per_second: f64, mut listener: impl Listener) {
+async fn both(open: Arc<Open>, socket: WebSocket, least: Role, per_second: f64, listener: &mut impl Listener) {
     let (sink, stream) = socket.split();
     let mut reader = Reader::new(&open, stream, least, per_second);
     let (end, ended) = tokio::sync::oneshot::channel();

@@ -25,13 +25,23 @@ pub(super) async fn run(open: Open, socket: WebSocket) {
             return;
         }
     };
-    both(open, socket, least, MESSAGES, Caller { least, signal }).await;
+    let mut caller = Caller { least, signal, calls: false };
+    both(open.clone(), socket, least, MESSAGES, &mut caller).await;
+    if caller.calls {
+        // The page is gone without a word: the drone need not wait for it.
+        let hang_up = serde_json::json!({ "hang_up": { "reason": "the page is gone" } });
+        if let Err(error) = open.app.fleet.say(&caller.signal, hang_up.to_string()).await {
+            tracing::debug!("{} was not told that a page is gone: {error}", open.drone.name);
+        }
+    }
 }
 
 /// A page that wants video.
 struct Caller {
     least: Role,
     signal: Signal,
+    /// It has said something, and not that it hangs up.
+    calls: bool,
 }
 
 impl Listener for Caller {
@@ -42,7 +52,8 @@ impl Listener for Caller {
         open.allowed(self.least)?;
         // The drone gets nothing that is no JSON object.
         match serde_json::from_str::<BTreeMap<String, serde::de::IgnoredAny>>(&text) {
-            Ok(_) => {
+            Ok(said) => {
+                self.calls = !said.contains_key("hang_up");
                 if let Err(error) = open.app.fleet.say(&self.signal, text.to_string()).await {
                     open.complain(&format!("the drone is not reached: {error}"));
                 }

@@ -73,7 +73,7 @@ pub(super) async fn run(open: Open, socket: WebSocket) {
     let Some(rule) = message_rule(open.socket, Says::Frame) else { return };
     let least = rule.least;
     open.drone.add_sticks(open.number, &open.page);
-    both(open, socket, least, FRAMES, Hands { least, input: 0 }).await;
+    both(open, socket, least, FRAMES, &mut Hands { least, input: 0 }).await;
 }
 
 /// A page whose human may fly.

@@ -24,7 +24,7 @@ pub(super) async fn run(open: Open, socket: WebSocket) {
     let open = Arc::new(open);
     let Some(rule) = message_rule(open.socket, Says::Subscribe) else { return };
     open.drone.watch(&open.page);
-    both(open, socket, rule.least, MESSAGES, Viewer).await;
+    both(open, socket, rule.least, MESSAGES, &mut Viewer).await;
 }
 
 /// A page that looks.
