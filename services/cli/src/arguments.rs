@@ -15,6 +15,12 @@ use std::path::PathBuf;
 pub(crate) struct Arguments {
     #[command(flatten)]
     pub place: Place,
+    /// Speak to a drone over the network: the configuration that `sereno certs client NAME` wrote.
+    #[arg(long, global = true, env = "SERENO_REMOTE")]
+    pub remote: Option<PathBuf>,
+    /// Which drone, when there are several on the network.
+    #[arg(long, global = true)]
+    pub drone: Option<String>,
     /// Print JSON for programs instead of text for people.
     #[arg(long, global = true)]
     pub json: bool,
@@ -87,6 +93,10 @@ pub(crate) enum Verb {
         #[command(subcommand)]
         order: TopicOrder,
     },
+    /// Certificates of drones, programs and the page.
+    Certs(crate::certs::Certs),
+    /// Print the JSON schema of every topic.
+    Schema,
     /// Draw the wiring that the manifest describes.
     Graph,
     /// Check manifest, configurations, vehicle and plan.
@@ -174,6 +184,9 @@ pub(crate) struct Up {
     /// Keep log files here after the end.
     #[arg(long)]
     pub logs: Option<PathBuf>,
+    /// A file laid over the manifest, as `sim.toml` is; may be repeated.
+    #[arg(long = "overlay", value_name = "FILE")]
+    pub overlays: Vec<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -336,6 +349,12 @@ pub(crate) struct Demo {
     /// with --once this must lead to no more than a hover.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100))]
     pub kills: u32,
+    /// How many drones fly, each a supervised system of its own, all on one console.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=4))]
+    pub drones: u8,
+    /// Where certificates and the console's accounts are kept between two demos; in the user's state directory when absent.
+    #[arg(long)]
+    pub state: Option<PathBuf>,
 }
 
 #[cfg(test)]

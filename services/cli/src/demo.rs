@@ -2,6 +2,7 @@
 
 use crate::arguments::Demo;
 use crate::kills::Kills;
+use crate::room::{Berth, Room};
 use airframe::picture::Picture;
 use airframe::score::{FlightReport, Outcome};
 use anyhow::{Context, Result, bail};
@@ -10,8 +11,9 @@ use cli::interrupt::Interrupt;
 use cli::orders::{Orders, next_order_number};
 use cli::place::Place;
 use cli::witness::Witness;
-use ipc_types::Verb;
+use ipc_types::{PilotState, Verb};
 use runtime::{Cache, Tool};
+use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
@@ -28,7 +30,7 @@ const REST: Duration = Duration::from_secs(2);
 struct System(Child);
 
 impl System {
-    fn start(place: &Place, seed: u64) -> Result<Self> {
+    fn start(place: &Place, overlay: &Path, seed: u64) -> Result<Self> {
         let program = std::env::current_exe().context("where am I?")?;
         let child = Command::new(program)
             .arg("--deploy")
@@ -36,6 +38,8 @@ impl System {
             .arg("--run-dir")
             .arg(place.run_dir()?)
             .args(["up", "--sim", "--quiet", "--seed", &seed.to_string()])
+            .arg("--overlay")
+            .arg(overlay)
             .stdin(Stdio::null())
             .spawn()
             .context("cannot start the system")?;
@@ -69,6 +73,11 @@ fn wait_until_ready(place: &Place, system: &mut System) -> Result<()> {
         }
         let rows =
             supervisor::Client::connect(&run_dir).and_then(|mut client| client.ps()).map(|all| all.services);
+        // What only shows something may still be built, and flies nothing.
+        let rows = rows.map(|mut rows| {
+            rows.retain(|row| row.criticality != "comfort");
+            rows
+        });
         match rows {
             Ok(rows) if !rows.is_empty() && rows.iter().all(|row| row.state == "running") => return Ok(()),
             Ok(rows) if began.elapsed() > READY => {
@@ -85,22 +94,111 @@ fn wait_until_ready(place: &Place, system: &mut System) -> Result<()> {
     }
 }
 
+/// Another drone than the one that is measured: started, sent on its round and stopped with the demo.
+struct Companion {
+    place: Place,
+    system: System,
+}
+
+impl Companion {
+    fn start(place: &Place, berth: &Berth, seed: u64) -> Result<Self> {
+        let mut run_dir = place.run_dir()?.into_os_string();
+        run_dir.push(format!("-{}", berth.name));
+        let place = Place { run_dir: Some(run_dir.into()), ..place.clone() };
+        let mut system = System::start(&place, &berth.overlay, seed)?;
+        wait_until_ready(&place, &mut system)?;
+        Ok(Self { place, system })
+    }
+
+    /// Sends it on its round, as an operator does.
+    fn send(&self) -> Result<()> {
+        let (manifest, _, run_dir) = self.place.running()?;
+        let mut tool = Tool::join("cli", manifest, &run_dir)?;
+        let mut orders = Orders::open(&mut tool.ports)?;
+        let mut state = tool.ports.input::<PilotState>()?;
+        let began = Instant::now();
+        while began.elapsed() < READY {
+            orders.give(Verb::PatrolStart, f32::NAN, f32::NAN, next_order_number());
+            let again = Instant::now();
+            while again.elapsed() < ORDER_AGAIN {
+                tool.tick();
+                while let Some(state) = state.receive() {
+                    if state.arm == 1 {
+                        return Ok(());
+                    }
+                }
+                std::thread::sleep(GLANCE);
+            }
+        }
+        bail!("the pilot of {} does not start its round", run_dir.path().display())
+    }
+}
+
 pub(crate) fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
     let stop = Interrupt::catch()?;
-    let mut system = System::start(place, demo.seed)?;
+    let state = demo.state.clone().unwrap_or_else(crate::room::state_directory);
+    let mut room = Room::prepare(place, state, usize::from(demo.drones))?;
+    let Some((first, others)) = room.berths.split_first() else { bail!("a demo needs a drone") };
+    let mut system = System::start(place, &first.overlay, demo.seed)?;
     wait_until_ready(place, &mut system)?;
+    let companions = others
+        .iter()
+        .zip(1..)
+        .map(|(berth, k)| Companion::start(place, berth, demo.seed.wrapping_add(k)))
+        .collect::<Result<Vec<_>>>()?;
     let mut kills = (demo.kills > 0)
         .then(|| Ok::<_, anyhow::Error>(Kills::new(place.run_dir()?, demo.kills, demo.seed)))
         .transpose()?;
-    let flown = fly(place, demo, kills.as_mut(), &stop, json);
+    for companion in &companions {
+        companion.send()?;
+    }
+    let mut page = (!demo.once).then_some(&mut room);
+    let flown = fly(place, demo, kills.as_mut(), page.as_deref_mut(), &stop, json);
+    let shown = flown.and_then(|(report, picture)| {
+        std::fs::write(&demo.picture, picture).with_context(|| demo.picture.display().to_string())?;
+        show(&report, demo, kills.as_ref(), json)?;
+        Ok(report)
+    });
+    if let (Ok(_), Some(room)) = (&shown, page) {
+        stay(room, &mut system, &stop, json);
+    }
+    for companion in companions {
+        companion.system.stop(&companion.place)?;
+    }
     system.stop(place)?;
-    let (report, picture) = flown?;
-    std::fs::write(&demo.picture, picture).with_context(|| demo.picture.display().to_string())?;
-    show(&report, demo, kills.as_ref(), json)?;
+    let report = shown?;
     let good = report.outcome == Outcome::LandedOnPad
         && report.contacts == 0
         && kills.as_ref().is_none_or(Kills::shrugged_off);
     Ok(if good || !demo.once { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// The round is over, and the drone is the guard's until Ctrl-C.
+fn stay(room: &mut Room, system: &mut System, stop: &Interrupt, json: bool) {
+    if !json {
+        println!("\nThe drone is yours now, from the page or by `sereno`; Ctrl-C lands it and ends the demo.");
+    }
+    while !stop.came() && matches!(system.0.try_wait(), Ok(None)) {
+        tell(room, json);
+        std::thread::sleep(ORDER_AGAIN / 10);
+    }
+}
+
+/// Passes on what the console says, and starts it as soon as it is built.
+fn tell(room: &mut Room, json: bool) {
+    if let Err(error) = room.open() {
+        eprintln!("no page: {error:#}");
+    }
+    for line in room.said() {
+        if json {
+            println!("{}", serde_json::json!({ "console": line }));
+        } else {
+            println!("  >> {line}");
+        }
+    }
+    if let Some(end) = room.ended() {
+        eprintln!("{end}");
+    }
 }
 
 /// Flies one round among processes that run already.
@@ -111,6 +209,7 @@ fn fly(
     place: &Place,
     demo: &Demo,
     mut kills: Option<&mut Kills>,
+    mut room: Option<&mut Room>,
     stop: &Interrupt,
     json: bool,
 ) -> Result<(FlightReport, String)> {
@@ -154,6 +253,9 @@ fn fly(
         if last_line.elapsed() >= Duration::from_secs(1) {
             last_line += Duration::from_secs(1);
             line(&witness, began.elapsed(), json);
+            if let Some(room) = room.as_deref_mut() {
+                tell(room, json);
+            }
         }
         if witness.landed() {
             if rest.get_or_insert_with(Instant::now).elapsed() > REST {

@@ -32,7 +32,23 @@ pub(crate) enum Order {
 }
 
 impl Order {
-    fn verb(self) -> (Verb, f32, f32) {
+    /// To a place on the plan.
+    pub(crate) fn goto(x: f32, y: f32) -> Result<Self> {
+        if !(x.is_finite() && y.is_finite()) {
+            bail!("a place is two finite numbers of metres on the plan, not {x} {y}");
+        }
+        Ok(Self::GoTo(x, y))
+    }
+
+    /// Cuts the motors, when it is said that the drone falls.
+    pub(crate) fn cut(yes_it_falls: bool) -> Result<Self> {
+        if !yes_it_falls {
+            bail!("cut: stops the motors at once, and in the air the drone falls; say --yes-it-falls if that is meant");
+        }
+        Ok(Self::Cut)
+    }
+
+    pub(crate) fn verb(self) -> (Verb, f32, f32) {
         let nowhere = f32::NAN;
         match self {
             Self::TakeOff => (Verb::TakeOff, nowhere, nowhere),
@@ -51,19 +67,8 @@ impl Order {
     }
 }
 
-/// Cuts the motors, when it is said that the drone falls.
-pub(crate) fn cut(place: &Place, yes_it_falls: bool, json: bool) -> Result<ExitCode> {
-    if !yes_it_falls {
-        bail!("cut: stops the motors at once, and in the air the drone falls; say --yes-it-falls if that is meant");
-    }
-    give(place, Order::Cut, json)
-}
-
 pub(crate) fn give(place: &Place, order: Order, json: bool) -> Result<ExitCode> {
     let (verb, x, y) = order.verb();
-    if matches!(order, Order::GoTo(..)) && !(x.is_finite() && y.is_finite()) {
-        bail!("a place is two finite numbers of metres on the plan, not {x} {y}");
-    }
     let stop = Interrupt::catch()?;
     let (manifest, _, run_dir) = place.running()?;
     let mut tool = runtime::Tool::join("cli", manifest, &run_dir)?;

@@ -1,7 +1,7 @@
 //! Commands about the services, over the supervisor's own socket.
 
 use crate::arguments::Up;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use cli::place::Place;
 use std::io::Write;
 use std::process::ExitCode;
@@ -15,8 +15,15 @@ const PATIENCE: Duration = Duration::from_secs(30);
 const DOWN_PATIENCE: Duration = Duration::from_secs(90);
 
 pub(crate) fn up(place: &Place, up: &Up, json: bool) -> Result<ExitCode> {
+    let mut manifests = place.manifest_files(up.sim)?;
+    for overlay in &up.overlays {
+        manifests.push(std::path::absolute(overlay)?);
+    }
+    if up.sim && up.overlays.is_empty() {
+        own_certificates(place)?;
+    }
     let options = supervisor::Options {
-        manifests: place.manifest_files(up.sim)?,
+        manifests,
         run_dir: Some(place.run_dir()?),
         logs: up.logs.clone(),
         seed: up.seed,
@@ -33,6 +40,25 @@ pub(crate) fn up(place: &Place, up: &Up, json: bool) -> Result<ExitCode> {
         let _ = writeln!(std::io::stdout(), "{{\"stopped\":true}}");
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Whoever only simulates needs no installation: the certificates without which the bridge stays silent are made here.
+fn own_certificates(place: &Place) -> Result<()> {
+    let (manifest, root) = place.manifest(true)?;
+    let Some(entry) = manifest.services.get("bridge") else { return Ok(()) };
+    let file = root.join(&entry.config);
+    let text = std::fs::read_to_string(&file).with_context(|| file.display().to_string())?;
+    let config: bridge::BridgeConfig = runtime::parse_config(&entry.config, &text)?;
+    let endpoint = config.listen.first().cloned().unwrap_or_else(|| "tls/127.0.0.1:7447".to_owned());
+    let directory = root.join(&config.certificates);
+    if bridge::Authority::at(&directory).exists() {
+        return Ok(());
+    }
+    if let Err(error) = crate::room::certificates(&directory, &[manifest.system.name.clone()], &[endpoint]) {
+        // It flies without anybody who watches from elsewhere.
+        eprintln!("no certificates, so the bridge will not start: {error:#}");
+    }
+    Ok(())
 }
 
 fn client(place: &Place) -> Result<Client> {
