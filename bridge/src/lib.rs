@@ -23,6 +23,7 @@ pub mod roles;
 pub mod schema;
 mod service;
 mod sessions;
+mod signals;
 mod taps;
 pub mod x509;
 pub mod zenoh_config;

@@ -87,6 +87,8 @@ pub enum Pace {
     Small,
     /// Large: particles, pictures.
     Large,
+    /// Not to be lost while the link lives: messages of video sessions.
+    Reliable,
 }
 
 /// A message on its way out.
@@ -245,14 +247,18 @@ fn send(session: &zenoh::Session, put: &Put) {
         Pace::Express => Priority::RealTime,
         Pace::Small => Priority::Data,
         Pace::Large => Priority::DataLow,
+        Pace::Reliable => Priority::InteractiveHigh,
     };
+    // Waiting for room ends within a second: then the connection of who does not read is closed.
+    let congestion =
+        if put.pace == Pace::Reliable { CongestionControl::Block } else { CongestionControl::Drop };
     // A session that has ended is replaced by its keeper.
     let _ = session
         .put(&*put.key, put.payload.as_slice())
         .encoding(put.encoding.clone())
-        .congestion_control(CongestionControl::Drop)
+        .congestion_control(congestion)
         .priority(priority)
-        .express(put.pace == Pace::Express)
+        .express(matches!(put.pace, Pace::Express | Pace::Reliable))
         .wait();
 }
 

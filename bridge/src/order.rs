@@ -6,8 +6,12 @@ use serde::{Deserialize, Serialize};
 
 /// An order or an input whose newest beacon is older than this is refused, nanoseconds.
 pub const BEACON_LIFE_NS: u64 = 2_000_000_000;
+/// Longest address of e-mail (RFC 5321, 4.5.3.1.3), bytes. A message has room for its beginning.
+const LONGEST_ACCOUNT: usize = 254;
 /// Farther from the plan's origin nothing is, metres.
 const FAR_M: f32 = 10_000.0;
+/// Browsers tell the time in steps of up to this, milliseconds.
+const CLOCK_STEP_MS: f64 = 2.0;
 /// Most milliseconds between a beacon and the input that names it.
 const LONGEST_SINCE_MS: f64 = 60_000.0;
 
@@ -77,8 +81,8 @@ impl Order {
                 format!("role = {}: allowed are viewer, guard, installer, administrator", shown(word))
             })?),
         };
-        if text.account.len() > 32 || text.account.chars().any(char::is_control) {
-            return Err(format!("account = {}: at most 32 bytes of text", shown(&text.account)));
+        if text.account.len() > LONGEST_ACCOUNT || text.account.chars().any(char::is_control) {
+            return Err(format!("account = {}: at most {LONGEST_ACCOUNT} bytes of text", shown(&text.account)));
         }
         let (x_m, y_m) = match (verb, text.x_m, text.y_m) {
             (Verb::GoTo, Some(x), Some(y)) if x.abs() <= FAR_M && y.abs() <= FAR_M => (x, y),
@@ -170,9 +174,10 @@ pub fn parse_sticks(json: &[u8], now: u64, first_beacon_ns: u64) -> Result<Input
     }
     // No clock but the drone's: the beacon was sent at `beacon_ns`, so the input cannot be younger than this.
     let age_ms = (now - text.beacon_ns) as f64 * 1e-6 - text.since_ms;
-    if age_ms < 0.0 {
+    if age_ms < -CLOCK_STEP_MS {
         return Err(format!("since_ms = {}: longer than the beacon is old", text.since_ms));
     }
+    let age_ms = age_ms.max(0.0);
     let switch = |on: bool, bit: u32| if on { bit } else { 0 };
     Ok(Input {
         sticks: Sticks {

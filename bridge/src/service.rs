@@ -7,6 +7,7 @@ use crate::keys::Keys;
 use crate::network::{Asker, Heard, Network, Pace};
 use crate::order::{Input as StickInput, parse_sticks};
 use crate::pending::{Pending, refusal};
+use crate::signals::Signals;
 use crate::taps::{self, AnyTap, Pacer, Tap};
 use ipc_types::{Command, Message, Patrol, PilotState, Sticks, Text};
 use runtime::{Output, Ports, Service, Start, StartError};
@@ -30,6 +31,8 @@ pub struct Bridge {
     pilot: Tap<PilotState>,
     navigation: Tap<Patrol>,
     taps: BTreeMap<String, Box<dyn AnyTap>>,
+    /// Video sessions, where the system has video.
+    signals: Option<Signals>,
     beacon: Pacer,
     beacon_key: Arc<str>,
     /// Set at the first step.
@@ -68,6 +71,7 @@ impl Service for Bridge {
             navigation: Tap::open(ports, Patrol::TOPIC, &patrol_key, patrol_period)?,
             command: ports.output()?,
             sticks: ports.output()?,
+            signals: Signals::open(ports, keys.clone())?,
             taps,
             gate: Gate::new(Arc::default(), 0),
             pending: Pending::default(),
@@ -150,8 +154,14 @@ impl Bridge {
                     };
                     self.network.answer(asker, newest);
                 }
-                // Nobody on board listens yet.
-                Heard::Signal { .. } => self.refused += 1,
+                Heard::Signal { certificate, session, json } => {
+                    let role = self.gate.role(&certificate, None);
+                    let taken = match (&mut self.signals, role) {
+                        (Some(signals), Some(role)) => signals.hear(&certificate, &session, role, &json),
+                        _ => false,
+                    };
+                    self.refused += u64::from(!taken);
+                }
             }
         }
     }
@@ -165,6 +175,9 @@ impl Bridge {
         let pending = &mut self.pending;
         self.pilot.pass(now, &self.network, |state| pending.hear_pilot(state));
         self.navigation.pass(now, &self.network, |patrol| pending.hear_navigation(patrol));
+        if let Some(signals) = &mut self.signals {
+            signals.pass(&self.network);
+        }
         for tap in self.taps.values_mut() {
             tap.pass(now, &self.network);
         }

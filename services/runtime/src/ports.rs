@@ -197,6 +197,12 @@ impl Ports {
         entry.map(|service| service.subscribes.keys().cloned().collect()).unwrap_or_default()
     }
 
+    /// Whether the manifest lets this service publish a topic.
+    #[must_use]
+    pub fn may_publish(&self, topic: &str) -> bool {
+        access::may_publish(&self.manifest, &self.service, topic)
+    }
+
     /// After a restart: the last valid sample of a retained topic, from the keeper. `None` at the first
     /// start, and when nothing was ever published.
     ///
