@@ -11,8 +11,8 @@ const LONGEST: &str = "-max_len=8192";
 const SLOWEST: &str = "-timeout=20";
 const SLOWEST_REPORT: &str = "-report_slow_units=20";
 
-/// The target that needs every service, and the feature that brings them.
-const SERVICES: (&str, &str) = ("config", "services");
+/// The targets that need every service, and the feature that brings them.
+const SERVICES: ([&str; 2], &str) = (["config", "network"], "services");
 
 /// Builds the targets and runs each for so long; all of them when none is named.
 ///
@@ -30,7 +30,7 @@ pub(crate) fn fuzz(root: &Path, seconds: u64, chosen: &[String]) -> Result<()> {
     let built = built.to_string_lossy();
     let mut run =
         vec!["fuzz", "run", "--fuzz-dir", "tests/fuzz", "--sanitizer", "none", "--target-dir", &built];
-    if chosen.iter().any(|target| target == SERVICES.0) {
+    if chosen.iter().any(|target| SERVICES.0.contains(&target.as_str())) {
         run.extend(["--features", SERVICES.1]);
     }
     let time = format!("-max_total_time={seconds}");

@@ -10,7 +10,7 @@ use std::fmt::Debug;
 pub fn config(data: &[u8]) -> bool {
     let Some((&selector, text)) = data.split_first() else { return false };
     let Ok(text) = std::str::from_utf8(text) else { return false };
-    match selector.wrapping_sub(b'0') % 7 {
+    match selector.wrapping_sub(b'0') % 8 {
         0 => load::<flight::Config>(text, |_| {}),
         1 => load::<flow::Config>(text, |_| {}),
         2 => load::<sonar::SonarConfig>(text, |_| {}),
@@ -19,7 +19,8 @@ pub fn config(data: &[u8]) -> bool {
         }),
         4 => load::<navigation::config::NavigationConfig>(text, |_| {}),
         5 => load::<pilot::PilotConfig>(text, |_| {}),
-        _ => load::<simulator::Config>(text, |_| {}),
+        6 => load::<simulator::Config>(text, |_| {}),
+        _ => load::<bridge::BridgeConfig>(text, |_| {}),
     }
 }
 

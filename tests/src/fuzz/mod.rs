@@ -21,6 +21,8 @@ mod config;
 mod manifest;
 mod memory;
 mod msp;
+#[cfg(feature = "services")]
+mod network;
 mod plan;
 mod vehicle;
 mod world;
@@ -30,6 +32,8 @@ pub use config::config;
 pub use manifest::manifest;
 pub use memory::{Peak, peak_of};
 pub use msp::msp_stream;
+#[cfg(feature = "services")]
+pub use network::network;
 pub use plan::{plan, sidecar};
 pub use vehicle::vehicle;
 pub use world::world;
@@ -51,11 +55,13 @@ pub const TARGETS: &[Target] = &[
     ("manifest", manifest),
     #[cfg(feature = "services")]
     ("config", config),
+    #[cfg(feature = "services")]
+    ("network", network),
 ];
 
 /// Services with a configuration, by selector: the target `config` takes `0` and the characters after it.
-pub const SERVICES: [&str; 7] =
-    ["flight", "flow", "sonar", "localization", "navigation", "pilot", "simulator"];
+pub const SERVICES: [&str; 8] =
+    ["flight", "flow", "sonar", "localization", "navigation", "pilot", "simulator", "bridge"];
 
 /// Parts two texts of one input: neither yaml nor TOML may hold it.
 pub const BETWEEN: u8 = 0;
