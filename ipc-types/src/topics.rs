@@ -2,8 +2,8 @@
 
 use crate::{
     Attitude, Channels, Command, Echo, FlightState, FlowMotion, Grid, Health, Message, Particles, Patrol,
-    Picture, PilotState, Ping, Polar, Pose, Power, Setpoint, Shutter, SignalIn, SignalOut, SonarRanges, Sticks, Trace,
-    Truth, Video, View, Wish,
+    Picture, PilotState, Ping, Polar, Pose, Power, Setpoint, Shutter, SignalIn, SignalOut, SonarRanges,
+    Sticks, Trace, Truth, Video, View, Wish,
 };
 
 /// Something to be done with a message type known only by its topic.

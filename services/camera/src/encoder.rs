@@ -9,7 +9,8 @@ use openh264::encoder::{
 use openh264::formats::YUVSource;
 use openh264::{OpenH264API, Timestamp};
 use openh264_sys2::{
-    ENCODER_OPTION_BITRATE, ENCODER_OPTION_FRAME_RATE, ENCODER_OPTION_MAX_BITRATE, SBitrateInfo, SPATIAL_LAYER_ALL,
+    ENCODER_OPTION, ENCODER_OPTION_BITRATE, ENCODER_OPTION_FRAME_RATE, ENCODER_OPTION_MAX_BITRATE,
+    ENCODER_OPTION_TRACE_LEVEL, SBitrateInfo, SPATIAL_LAYER_ALL, WELS_LOG_QUIET,
 };
 
 /// Why a frame was not encoded.
@@ -120,8 +121,7 @@ impl Encoder {
         key: bool,
         out: &mut [u8],
     ) -> Result<Encoded, EncodeError> {
-        let wanted =
-            Tuning { size: (frame.width, frame.height), fps: format.fps, bitrate: format.bitrate };
+        let wanted = Tuning { size: (frame.width, frame.height), fps: format.fps, bitrate: format.bitrate };
         if self.codec.as_ref().is_none_or(|(_, tuning)| tuning.size != wanted.size) {
             self.codec = Some((start(&wanted, self.key_every_s)?, wanted));
         }
@@ -172,7 +172,25 @@ fn start(tuning: &Tuning, key_every_s: f64) -> Result<Codec, EncodeError> {
         // Key frames come when they are asked for: one in a turn of the drone would only be late.
         .scene_change_detect(false)
         .num_threads(1);
-    Codec::with_api_config(OpenH264API::from_source(), config).map_err(|error| failed(&error))
+    let mut codec =
+        Codec::with_api_config(OpenH264API::from_source(), config).map_err(|error| failed(&error))?;
+    let mut quiet = WELS_LOG_QUIET;
+    // It would write to the log that it may exceed the bitrate where no frame is left out, which is meant.
+    set(&mut codec, ENCODER_OPTION_TRACE_LEVEL, &mut quiet)?;
+    Ok(codec)
+}
+
+/// Sets an option of an encoder; `value` must be of the type that the option takes (codec_app_def.h).
+fn set<T>(codec: &mut Codec, option: ENCODER_OPTION, value: &mut T) -> Result<(), EncodeError> {
+    #[allow(unsafe_code, reason = "openh264 has no safe way to change a running encoder")]
+    // SAFETY: the three callers pass what codec_app_def.h says for their option: an int, an `SBitrateInfo`, a float; the
+    // library reads it during the call only.
+    let code = unsafe { codec.raw_api().set_option(option, (&raw mut *value).cast()) };
+    if code == 0 {
+        Ok(())
+    } else {
+        Err(EncodeError::Codec(format!("option {option} is refused (code {code})")))
+    }
 }
 
 /// Changes bitrate and pace of an encoder that runs, without a key frame.
@@ -186,20 +204,10 @@ fn retune(codec: &mut Codec, tuning: &mut Tuning, wanted: &Tuning) -> Result<(),
         [ENCODER_OPTION_BITRATE, ENCODER_OPTION_MAX_BITRATE]
     };
     for option in order {
-        #[allow(unsafe_code, reason = "openh264 has no safe way to change the bitrate of a running encoder")]
-        // SAFETY: both options take a pointer to `SBitrateInfo`, which is read during the call only (codec_app_def.h).
-        let code = unsafe { codec.raw_api().set_option(option, (&raw mut bitrate).cast()) };
-        if code != 0 {
-            return Err(EncodeError::Codec(format!("bitrate {} is refused (code {code})", wanted.bitrate)));
-        }
+        set(codec, option, &mut bitrate)?;
     }
     if wanted.fps != tuning.fps {
-        #[allow(unsafe_code, reason = "as above, of the frame rate")]
-        // SAFETY: the option takes a pointer to a float, which is read during the call only (codec_app_def.h).
-        let code = unsafe { codec.raw_api().set_option(ENCODER_OPTION_FRAME_RATE, (&raw mut fps).cast()) };
-        if code != 0 {
-            return Err(EncodeError::Codec(format!("{} frames a second are refused (code {code})", wanted.fps)));
-        }
+        set(codec, ENCODER_OPTION_FRAME_RATE, &mut fps)?;
     }
     *tuning = *wanted;
     Ok(())

@@ -110,11 +110,8 @@ impl Service for Camera {
                 video.format = Format { width: frame.width, height: frame.height, ..format };
                 video.key = u32::from(encoded.key);
                 video.length = encoded.length as u32;
-                self.last = Last {
-                    format: video.format,
-                    encode_ns: video.encode_ns,
-                    frames: self.last.frames + 1,
-                };
+                self.last =
+                    Last { format: video.format, encode_ns: video.encode_ns, frames: self.last.frames + 1 };
                 video.send();
                 if encoded.key {
                     self.last_key_ns = Some(now);

@@ -22,8 +22,10 @@ impl Wishes {
             return;
         }
         let publisher = |known: &Wish| (known.header.publisher, known.header.incarnation);
-        let same = self.newest.iter().position(|known| known.as_ref().map(publisher) == Some(publisher(wish)));
-        let free = || self.newest.iter().position(|known| known.as_ref().is_none_or(|known| !known.counts(now)));
+        let same =
+            self.newest.iter().position(|known| known.as_ref().map(publisher) == Some(publisher(wish)));
+        let free =
+            || self.newest.iter().position(|known| known.as_ref().is_none_or(|known| !known.counts(now)));
         let Some(place) = same.or_else(free).and_then(|index| self.newest.get_mut(index)) else {
             self.refused += 1;
             return;

@@ -31,7 +31,10 @@ impl Service for Scenery {
             return Err(StartError::invalid("scenery starts in a simulated system only"));
         }
         let mount = start.vehicle.camera.as_ref().ok_or_else(|| {
-            StartError::Invalid(format!("{} has no [camera]: there is nothing to render", start.system.vehicle))
+            StartError::Invalid(format!(
+                "{} has no [camera]: there is nothing to render",
+                start.system.vehicle
+            ))
         })?;
         Ok(Self {
             views: ports.input()?,

@@ -1,8 +1,8 @@
 //! One flight behind ports.
 
+use crate::view::fill_view;
 use crate::{Config, build_world};
 use airframe::simulation::{PingAnswer, STEP_NS, Simulation, TruthState};
-use crate::view::fill_view;
 use ipc_types::{
     ARM_WITH_THE_RADIO, Echo, EchoReading, FlightState, MAX_PEOPLE, PersonTruth, Ping, Shutter, Text, Truth,
     View,

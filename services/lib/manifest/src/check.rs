@@ -8,6 +8,13 @@ use std::collections::BTreeMap;
 pub(crate) const TRUTH: &str = "sim/truth";
 /// What people send: published by tools and gateways, possibly by none at a given moment.
 const OPERATOR: &str = "operator/";
+/// Who watches says so, and several may: the stream, a recorder, a program.
+const WISH: &str = "camera/wish";
+
+/// What people say, through whichever program: such a topic has any number of publishers.
+fn is_said_by_people(topic: &str) -> bool {
+    topic.starts_with(OPERATOR) || topic == WISH
+}
 
 impl Manifest {
     /// Checks that every topic is known, published once and read by whom it may be, and that no device is
@@ -62,7 +69,7 @@ impl Manifest {
                     );
                 }
                 if let Some(other) = publisher.insert(topic, &service.name)
-                    && !topic.starts_with(OPERATOR)
+                    && !is_said_by_people(topic)
                 {
                     problem(field, format!("already published by {other}; a topic has one publisher"));
                 }
@@ -97,7 +104,7 @@ impl Manifest {
                     .strip_prefix("health/")
                     .or_else(|| topic.strip_prefix("trace/"))
                     .is_some_and(|who| self.services.contains_key(who));
-                if !implicit && !topic.starts_with(OPERATOR) && !publisher.contains_key(topic.as_str()) {
+                if !implicit && !is_said_by_people(topic) && !publisher.contains_key(topic.as_str()) {
                     problem(field, "no service publishes it".into());
                 }
             }
@@ -107,8 +114,11 @@ impl Manifest {
                 let field = format!("tool.{}.publishes", tool.name);
                 if !known(topic) {
                     problem(field, format!("{topic}: {}", unknown(topic)));
-                } else if !topic.starts_with(OPERATOR) {
-                    problem(field, format!("{topic}: tools may publish only what people say (operator/*)"));
+                } else if !is_said_by_people(topic) {
+                    problem(
+                        field,
+                        format!("{topic}: tools may publish only what people say (operator/*, camera/wish)"),
+                    );
                 }
             }
         }

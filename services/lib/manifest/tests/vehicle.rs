@@ -104,8 +104,16 @@ fn absurd_values_are_refused_with_their_range() {
             "descend_m_s = 0.3\nheight_m = 0.2",
             "limits.height_m = 0.2: allowed is 0.5 to 2.5",
         ),
-        ("[limits]", "[camera]\nelevation_deg = 91\n[limits]", "camera.elevation_deg = 91: allowed is -90 to 90"),
-        ("[limits]", "[camera]\nfield_of_view_deg = 180\n[limits]", "field_of_view_deg = 180: allowed is 20 to 120"),
+        (
+            "[limits]",
+            "[camera]\nelevation_deg = 91\n[limits]",
+            "camera.elevation_deg = 91: allowed is -90 to 90",
+        ),
+        (
+            "[limits]",
+            "[camera]\nfield_of_view_deg = 180\n[limits]",
+            "field_of_view_deg = 180: allowed is 20 to 120",
+        ),
         ("[limits]", "[camera]\nx_m = 1.0\n[limits]", "camera.x_m = 1: allowed is -0.225 to 0.225"),
         ("x_m = 0.1", "x_m = 1.0", "sonar front: x_m = 1: allowed is -0.225 to 0.225"),
         ("name = \"left\"", "name = \"front\"", "two sonars are called front"),

@@ -49,7 +49,7 @@ impl Scene {
             let first = still.faces.len();
             still.solid(solid, paint_of(world, solid), ceiling);
             if solid.role == Role::Wall {
-                still.drop_faces(first, |middle, normal| is_inside_walls(world, middle, normal));
+                still.drop_faces(first, |corners, normal| is_inside_walls(world, corners, normal));
             }
             if still.faces.len() > first {
                 still.body(first, None);
@@ -95,12 +95,16 @@ fn floor_and_ceiling(world: &World, mesh: &mut Mesh) {
     }
 }
 
-/// Whether a face of a wall's block lies against another block: nobody sees it, but where blocks of a bent building stand
-/// a millimetre apart its edge would show as a crack.
-fn is_inside_walls(world: &World, middle: [f32; 3], normal: [f32; 3]) -> bool {
-    const OUT_M: f32 = 0.03;
-    let (x, y) = (middle[0] + OUT_M * normal[0], middle[1] + OUT_M * normal[1]);
-    world.solids_at(x, y).any(|solid| solid.role == Role::Wall && solid.outline_distance(x, y) < 0.0)
+/// Whether a face of a wall's block lies against other blocks all along: nobody sees it, but where blocks of a bent building
+/// stand a millimetre apart its edge would show as a crack.
+fn is_inside_walls(world: &World, corners: &[[f32; 3]], normal: [f32; 3]) -> bool {
+    const OUT_M: f32 = 0.01;
+    let (Some(a), Some(b)) = (corners.first(), corners.get(1)) else { return false };
+    [0.02f32, 0.25, 0.5, 0.75, 0.98].into_iter().all(|share| {
+        let along = |k: usize| a[k] + share * (b[k] - a[k]) + OUT_M * normal[k];
+        let (x, y) = (along(0), along(1));
+        world.solids_at(x, y).any(|solid| solid.role == Role::Wall && solid.outline_distance(x, y) < 0.0)
+    })
 }
 
 fn paint_of(world: &World, solid: &Solid) -> Paint {

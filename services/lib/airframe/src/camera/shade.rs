@@ -19,6 +19,8 @@ const STEPS: usize = 2048;
 const RING: f32 = 4.5;
 /// What there is at night besides: the glow of signs and screens.
 const GLOW: f32 = 0.004;
+/// Light changes slowly: it is worked out at every so many pixels of a face and drawn straight between them.
+const BLOCK: usize = 8;
 /// Largest deviation of a pixel by the sensor's noise, steps of luma.
 const NOISE: (u32, u32) = (2, 7);
 /// Tiles and ceiling panels, metres; lines fade with distance, or they would flicker.
@@ -96,20 +98,8 @@ pub(super) fn picture(
             match scene.face(number).filter(|_| number != NOTHING) {
                 None => line[at..end].fill(BLACK as u8),
                 Some(face) => {
-                    let painted = Painted::new(face, light);
-                    let pixels = line[at..end].iter_mut().zip(&nearness[at..end]).enumerate();
-                    for (k, (pixel, near)) in pixels {
-                        let across = (at + k) as f32;
-                        let ray: [f32; 3] = std::array::from_fn(|i| begin[i] + across * step[i]);
-                        let ahead = 1.0 / near.max(1.0 / FAR_M);
-                        let place: [f32; 3] = std::array::from_fn(|i| look.eye[i] + ray[i] * ahead);
-                        let lit = match light {
-                            Light::Day => by_day(scene, &painted, place, ahead),
-                            Light::Night => by_night(scene, &painted, place, ray, ahead),
-                        };
-                        let index = (lit * (STEPS as f32 / BRIGHTEST)) as usize;
-                        *pixel = curve[index.min(STEPS - 1)];
-                    }
+                    let run = Run { scene, look, light, painted: Painted::new(face, light), begin, step };
+                    run.paint(at, &mut line[at..end], &nearness[at..end], curve);
                 }
             }
             at = end;
@@ -127,6 +117,74 @@ pub(super) fn picture(
             }
         }
     }
+}
+
+/// Neighbouring pixels of one row that show one face.
+struct Run<'a> {
+    scene: &'a Scene,
+    look: &'a Look,
+    light: Light,
+    painted: Painted<'a>,
+    /// Direction through the row's first pixel, and from each to the next.
+    begin: [f32; 3],
+    step: [f32; 3],
+}
+
+impl Run<'_> {
+    fn paint(&self, first: usize, pixels: &mut [u8], nearness: &[f32], curve: &[u8; STEPS]) {
+        let last = pixels.len().saturating_sub(1);
+        let steps = STEPS as f32 / BRIGHTEST;
+        let mut here = self.light(first, nearness[0]) * steps;
+        let blocks = pixels.chunks_mut(BLOCK).zip(nearness.chunks(BLOCK)).enumerate();
+        for (block, (pixels, near)) in blocks {
+            let start = block * BLOCK;
+            let end = (start + BLOCK).min(last);
+            let there = if end > start { self.light(first + end, nearness[end]) * steps } else { here };
+            let slope = (there - here) / (end - start).max(1) as f32;
+            if matches!(self.painted.paint.pattern, Pattern::Plain | Pattern::Lamp) {
+                for (k, pixel) in pixels.iter_mut().enumerate() {
+                    *pixel = shown(curve, here + slope * k as f32);
+                }
+            } else {
+                for (k, (pixel, near)) in pixels.iter_mut().zip(near).enumerate() {
+                    let (place, _, ahead) = self.place(first + start + k, *near);
+                    let share = pattern(self.scene, &self.painted, place, ahead);
+                    *pixel = shown(curve, (here + slope * k as f32) * share);
+                }
+            }
+            here = there;
+        }
+    }
+
+    /// World-frame place of a pixel, the direction to it one metre ahead, and how far ahead it is.
+    #[inline]
+    fn place(&self, column: usize, near: f32) -> ([f32; 3], [f32; 3], f32) {
+        let across = column as f32;
+        let ray: [f32; 3] = std::array::from_fn(|i| self.begin[i] + across * self.step[i]);
+        let ahead = 1.0 / near.max(1.0 / FAR_M);
+        (std::array::from_fn(|i| self.look.eye[i] + ray[i] * ahead), ray, ahead)
+    }
+
+    /// Light that comes back from a pixel, without its pattern.
+    fn light(&self, column: usize, near: f32) -> f32 {
+        let (place, ray, ahead) = self.place(column, near);
+        match self.light {
+            Light::Day => by_day(self.scene, &self.painted, place),
+            Light::Night => by_night(&self.painted, place, ray, ahead),
+        }
+    }
+}
+
+#[inline]
+fn shown(curve: &[u8; STEPS], step: f32) -> u8 {
+    curve[(step as usize).min(STEPS - 1)]
+}
+
+/// The whole number below, without a call into the library of mathematics.
+#[inline]
+fn floor(v: f32) -> f32 {
+    let whole = v as i32;
+    (whole - i32::from((whole as f32) > v)) as f32
 }
 
 /// Colour of every second pixel of a row: that of its face's paint, weaker in the dark.
@@ -148,7 +206,7 @@ fn colours(scene: &Scene, faces: &[u32], luma: &[u8], blue: &mut [u8], red: &mut
 }
 
 #[inline]
-fn by_day(scene: &Scene, painted: &Painted<'_>, place: [f32; 3], ahead: f32) -> f32 {
+fn by_day(scene: &Scene, painted: &Painted<'_>, place: [f32; 3]) -> f32 {
     if painted.paint.pattern == Pattern::Lamp {
         return BRIGHTEST;
     }
@@ -165,11 +223,11 @@ fn by_day(scene: &Scene, painted: &Painted<'_>, place: [f32; 3], ahead: f32) -> 
         }
         None => painted.facing,
     };
-    painted.paint.albedo * lit * facing * pattern(scene, painted, place, ahead)
+    painted.paint.albedo * lit * facing
 }
 
 #[inline]
-fn by_night(scene: &Scene, painted: &Painted<'_>, place: [f32; 3], ray: [f32; 3], ahead: f32) -> f32 {
+fn by_night(painted: &Painted<'_>, place: [f32; 3], ray: [f32; 3], ahead: f32) -> f32 {
     // `ray` is a metre ahead and so the longer the farther off the axis.
     let square = dot(ray, ray);
     let towards = match painted.face.axis {
@@ -185,7 +243,7 @@ fn by_night(scene: &Scene, painted: &Painted<'_>, place: [f32; 3], ray: [f32; 3]
     let beam = 1.0 / (square * square);
     let ring = RING * beam * (0.25 + 0.75 * towards.max(0.0)) / (0.35 + range_square);
     let painted_as = if painted.paint.pattern == Pattern::Lamp { 0.5 } else { painted.paint.infrared };
-    painted_as * (ring + GLOW) * pattern(scene, painted, place, ahead)
+    painted_as * (ring + GLOW)
 }
 
 /// How much darker than its paint a place on a face is.
@@ -209,16 +267,16 @@ fn pattern(scene: &Scene, painted: &Painted<'_>, place: [f32; 3], ahead: f32) ->
         }
         Pattern::Tiles => {
             let (tile_x, tile_y) = (x * (1.0 / TILE_M), y * (1.0 / TILE_M));
-            let (cx, cy) = (tile_x.floor(), tile_y.floor());
+            let (cx, cy) = (floor(tile_x), floor(tile_y));
             let odd = if (cx as i32 ^ cy as i32) & 1 == 0 { 0.06 } else { -0.06 };
             1.0 + odd - line(tile_x - cx, tile_y - cy, ahead) * 0.45
         }
         Pattern::Panels => {
             let (panel_x, panel_y) = (x * (1.0 / TILE_M), y * (1.0 / TILE_M));
-            1.0 - line(panel_x - panel_x.floor(), panel_y - panel_y.floor(), ahead) * 0.4
+            1.0 - line(panel_x - floor(panel_x), panel_y - floor(panel_y), ahead) * 0.4
         }
         Pattern::Cloth => {
-            let at = |v: f32| (v * 40.0).floor() as i32 as u32;
+            let at = |v: f32| floor(v * 40.0) as i32 as u32;
             let mixed = at(x).wrapping_mul(0x9e37_79b1)
                 ^ at(y).wrapping_mul(0x85eb_ca77)
                 ^ at(z).wrapping_mul(0xc2b2_ae3d);
@@ -227,7 +285,7 @@ fn pattern(scene: &Scene, painted: &Painted<'_>, place: [f32; 3], ahead: f32) ->
         }
         Pattern::Seams => {
             let seam = z * (1.0 / 0.5) + 0.5;
-            let off = (seam - seam.round()).abs() * 0.5;
+            let off = (seam - floor(seam + 0.5)).abs() * 0.5;
             if off < 0.012 { 0.55 } else { 1.0 }
         }
     }

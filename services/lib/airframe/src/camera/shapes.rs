@@ -66,17 +66,14 @@ impl Mesh {
         self.faces.push(Face { first, corners: corners.len() as u8, normal, paint, axis });
     }
 
-    /// Drops the faces since `first` of which `drop` (their middle, their normal) says so.
-    pub(super) fn drop_faces(&mut self, first: usize, drop: impl Fn([f32; 3], [f32; 3]) -> bool) {
+    /// Drops the faces since `first` of which `drop` (their corners, their normal) says so.
+    pub(super) fn drop_faces(&mut self, first: usize, drop: impl Fn(&[[f32; 3]], [f32; 3]) -> bool) {
         let mut number = 0;
         let points = &self.points;
         self.faces.retain(|face| {
             number += 1;
             let corners = &points[face.first as usize..face.first as usize + usize::from(face.corners)];
-            let middle = std::array::from_fn(|k| {
-                corners.iter().map(|corner| corner[k]).sum::<f32>() / corners.len() as f32
-            });
-            number <= first || !drop(middle, face.normal)
+            number <= first || !drop(corners, face.normal)
         });
     }
 

@@ -1,0 +1,188 @@
+//! World, scenery and camera on the lockstep bus: wishes in, video out.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use camera::{Camera, CameraConfig};
+use ipc_types::{Format, Truth, Video, View, WISH_LIFE_NS, Wish};
+use openh264::decoder::Decoder;
+use openh264::formats::YUVSource;
+use runtime::{Cache, Input, Lockstep, Output, load_manifest};
+use simulator::{Config, Scenery, Simulator};
+use std::path::Path;
+
+const MS: u64 = 1_000_000;
+const SMALL: Format = Format { width: 640, height: 480, fps: 30, bitrate: 1_000_000 };
+
+struct Bench {
+    bus: Lockstep,
+    wishes: Output<Wish>,
+    videos: Input<Video>,
+    views: Input<View>,
+    decoder: Decoder,
+    key_requests: u32,
+}
+
+/// What came within a while.
+#[derive(Default, Debug)]
+struct Seen {
+    videos: Vec<(u32, bool, u64, u64)>,
+    views: usize,
+    decoded: usize,
+    mean_luma: u64,
+}
+
+impl Bench {
+    fn new(config: CameraConfig) -> Self {
+        let deploy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy");
+        let (manifest, root) =
+            load_manifest(&format!("{0}/system.toml:{0}/sim.toml", deploy.display())).unwrap();
+        let mut bus = Lockstep::new(manifest, &root, 3, Cache::default());
+        let mut ports = bus.tool("cli");
+        let (wishes, videos, views) =
+            (ports.output().unwrap(), ports.input().unwrap(), ports.input().unwrap());
+        bus.add_with::<Simulator>(Config::default()).unwrap();
+        bus.add_with::<Scenery>(Config::default()).unwrap();
+        bus.add_with::<Camera>(config).unwrap();
+        Self { bus, wishes, videos, views, decoder: Decoder::new().unwrap(), key_requests: 0 }
+    }
+
+    /// Runs on; with a format, somebody wishes for it all the time.
+    fn run(&mut self, for_ms: u64, format: Option<Format>) -> Seen {
+        let mut seen = Seen::default();
+        for _ in 0..for_ms / 20 {
+            if let Some(format) = format {
+                let expiry_ns = self.bus.now() + 200 * MS;
+                let wish = Wish { format, expiry_ns, key_requests: self.key_requests, ..Wish::default() };
+                assert!(self.wishes.publish(&wish));
+            }
+            self.bus.run_until(self.bus.now() + 20 * MS);
+            while let Some(video) = self.videos.receive() {
+                seen.videos.push((
+                    video.format.width,
+                    video.key == 1,
+                    video.capture_ns,
+                    video.header.stamp_ns,
+                ));
+                if let Some(picture) = self.decoder.decode(video.access_unit()).unwrap() {
+                    seen.decoded += 1;
+                    let luma = picture.y();
+                    seen.mean_luma = luma.iter().map(|v| u64::from(*v)).sum::<u64>() / luma.len() as u64;
+                }
+            }
+            while self.views.receive().is_some() {
+                seen.views += 1;
+            }
+        }
+        seen
+    }
+}
+
+#[test]
+fn nobody_wishes_nothing_is_rendered_and_a_wish_wakes_all() {
+    let mut bench = Bench::new(CameraConfig::default());
+    let asleep = bench.run(1000, None);
+    assert_eq!((asleep.videos.len(), asleep.views), (0, 0));
+    assert!(bench.bus.status("camera").starts_with("asleep"), "{}", bench.bus.status("camera"));
+    let awake = bench.run(2000, Some(SMALL));
+    assert!((54..=61).contains(&awake.videos.len()), "{} frames in 2 s at 30", awake.videos.len());
+    assert_eq!(awake.decoded, awake.videos.len());
+    assert!(awake.videos[0].1 && awake.videos.iter().filter(|video| video.1).count() == 1);
+    assert!((40..220).contains(&awake.mean_luma), "a picture, not a black one: {}", awake.mean_luma);
+    for (_, _, capture, sent) in &awake.videos {
+        assert!(capture < sent && sent - capture < 30 * MS, "captured at {capture}, sent at {sent}");
+    }
+    // The wish expires: what was under way comes, and nothing after it.
+    let _ = bench.run(240, None);
+    let asleep = bench.run(2000, None);
+    assert_eq!((asleep.videos.len(), asleep.views), (0, 0));
+    assert_eq!(
+        bench.bus.refused("camera") + bench.bus.refused("scenery") + bench.bus.refused("simulator"),
+        0
+    );
+}
+
+#[test]
+fn key_frames_size_and_pace_change_in_flight() {
+    let mut bench = Bench::new(CameraConfig::default());
+    bench.run(500, Some(SMALL));
+    bench.key_requests += 1;
+    let asked = bench.run(500, Some(SMALL));
+    assert_eq!(asked.videos.iter().filter(|video| video.1).count(), 1);
+    // Ten requests at once are one key frame, and those of a second are limited by the pause of 300 ms.
+    let mut keys = 0;
+    for _ in 0..50 {
+        bench.key_requests += 1;
+        keys += bench.run(20, Some(SMALL)).videos.iter().filter(|video| video.1).count();
+    }
+    assert!((3..=5).contains(&keys), "{keys} key frames in a second");
+    let large = bench.run(1000, Some(Format { width: 1280, height: 720, fps: 15, bitrate: 2_000_000 }));
+    let first = large.videos.iter().position(|video| video.0 == 1280).unwrap();
+    assert!(large.videos[first].1, "a new size begins with a key frame");
+    assert!(
+        first <= 2 && (13..=17).contains(&(large.videos.len() - first)),
+        "{first}, {}",
+        large.videos.len()
+    );
+    assert_eq!(large.decoded, large.videos.len());
+}
+
+#[test]
+fn a_killed_camera_comes_back_with_a_key_frame() {
+    let mut bench = Bench::new(CameraConfig::default());
+    bench.run(500, Some(SMALL));
+    bench.bus.kill("camera");
+    assert!(bench.run(300, Some(SMALL)).videos.len() <= 2);
+    bench.bus.add_with::<Camera>(CameraConfig::default()).unwrap();
+    bench.decoder = Decoder::new().unwrap();
+    let back = bench.run(300, Some(SMALL));
+    assert!(back.videos.len() >= 6 && back.videos[0].1, "{:?}", back.videos);
+    assert_eq!(back.decoded, back.videos.len());
+}
+
+#[test]
+fn a_test_pattern_needs_no_simulator() {
+    let mut bench = Bench::new(CameraConfig { source: "test-pattern".into(), ..CameraConfig::default() });
+    let seen = bench.run(1000, Some(SMALL));
+    assert!(
+        (27..=31).contains(&seen.videos.len()) && seen.views == 0,
+        "{} {}",
+        seen.videos.len(),
+        seen.views
+    );
+}
+
+/// The same flight, whether it is filmed or not: the truth is equal, bit for bit.
+#[test]
+fn filming_changes_nothing() {
+    let truths = |filmed: bool| {
+        let mut bench = Bench::new(CameraConfig::default());
+        let mut truths: Input<Truth> = bench.bus.tool("cli").input().unwrap();
+        let mut all = Vec::new();
+        for _ in 0..20 {
+            bench.run(100, filmed.then_some(SMALL));
+            while let Some(truth) = truths.receive() {
+                // The header's stamp is that of the step, and a shutter wakes the simulator between its ticks.
+                all.push(format!("{:?}", Truth { header: ipc_types::Header::default(), ..*truth }));
+            }
+        }
+        all
+    };
+    let (alone, filmed) = (truths(false), truths(true));
+    assert!(alone.len() > 90);
+    let equal = alone.iter().zip(&filmed).filter(|(a, b)| a == b).count();
+    assert!(equal * 10 >= alone.len() * 9, "{equal} of {}", alone.len());
+    assert_eq!(alone.last(), filmed.last());
+}
+
+#[test]
+fn a_wish_for_ever_or_for_an_odd_size_is_not_obeyed() {
+    let mut bench = Bench::new(CameraConfig::default());
+    let now = bench.bus.now();
+    let forever = Wish { format: SMALL, expiry_ns: now + 10 * WISH_LIFE_NS, ..Wish::default() };
+    bench.wishes.publish(&forever);
+    assert_eq!(bench.run(300, None).videos.len(), 0);
+    let odd =
+        Wish { format: Format { width: 641, ..SMALL }, expiry_ns: bench.bus.now() + 500 * MS, ..forever };
+    bench.wishes.publish(&odd);
+    assert_eq!(bench.run(300, None).videos.len(), 0);
+    assert_eq!(bench.bus.refused("camera"), 1);
+}
