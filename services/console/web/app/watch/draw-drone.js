@@ -152,7 +152,7 @@ export function drawPlaces(view) {
     context.lineWidth = 1.75;
     context.stroke();
     context.restore();
-    label(view, `${number(100 * place.share)} %`, x, y, { color: palette.text, size: 0.86, weight: 640 });
+    label(view, `${number(100 * place.share)} %`, x, y - radius - 0.6 * view.em, { color: palette.text, size: 0.86, weight: 640 });
   }
 }
 
