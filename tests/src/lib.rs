@@ -24,7 +24,8 @@ pub fn programs() -> PathBuf {
     target.join("release")
 }
 
-/// Copies `deploy/` to `directory` with another plan and its world: their names without an ending.
+/// Copies `deploy/` to `directory` with another plan and its world (their names without an ending) and a free port for
+/// the bridge.
 ///
 /// # Errors
 /// What reading and writing files reports.
@@ -45,6 +46,11 @@ pub fn deploy_with(directory: &Path, building: &str) -> std::io::Result<PathBuf>
             text.replace("worlds/demo.toml", &format!("worlds/{building}.toml")),
         )?;
     }
+    // Systems fly beside each other in tests, and only one of them can listen at the usual place.
+    let bridge = copy.join("config/bridge.toml");
+    let port = std::net::TcpListener::bind("127.0.0.1:0")?.local_addr()?.port();
+    let text = std::fs::read_to_string(&bridge)?.replace("127.0.0.1:7447", &format!("127.0.0.1:{port}"));
+    std::fs::write(&bridge, text)?;
     Ok(copy)
 }
 

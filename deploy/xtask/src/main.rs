@@ -32,6 +32,9 @@ enum Task {
         /// Kill each flight-critical service so often (SIGKILL) at random moments.
         #[arg(long, default_value_t = 0)]
         kills: u32,
+        /// How many drones fly on one console, 1 to 4.
+        #[arg(long, default_value_t = 1)]
+        drones: u8,
     },
     /// Run every test.
     Test,
@@ -62,7 +65,7 @@ enum Task {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let done = match arguments.task {
-        Task::Demo { once, seed, picture, kills } => demo(once, seed, &picture, kills),
+        Task::Demo { once, seed, picture, kills, drones } => demo(once, seed, &picture, kills, drones),
         Task::Test => test(),
         Task::Fuzz { seconds, targets } => {
             checkout().and_then(|root| fuzz::fuzz(&root, seconds, &targets)).map(|()| ExitCode::SUCCESS)
@@ -100,32 +103,56 @@ fn cargo(root: &Path, arguments: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// Executables of the system: one a service, the supervisor and the command line.
-const PROGRAMS: [&str; 9] =
-    ["cli", "supervisor", "sonar", "flow", "flight", "localization", "navigation", "pilot", "simulator"];
+/// Executables that a flight needs: the command line, the supervisor and one a service.
+const PROGRAMS: [&str; 10] = [
+    "sereno",
+    "sereno-supervisor",
+    "sereno-sonar",
+    "sereno-flow",
+    "sereno-flight",
+    "sereno-localization",
+    "sereno-navigation",
+    "sereno-pilot",
+    "sereno-simulator",
+    "sereno-bridge",
+];
+/// Those that only show it.
+const WATCHERS: [&str; 2] = ["sereno-console", "sereno-camera"];
+
+fn build_arguments(programs: &[&'static str]) -> Vec<&'static str> {
+    // With the features that the whole workspace wants: whatever is chosen, no crate is built twice.
+    let mut arguments = vec!["build", "--release", "--workspace"];
+    for program in programs {
+        arguments.extend(["--bin", program]);
+    }
+    arguments
+}
 
 fn build_programs(root: &Path) -> Result<PathBuf> {
     println!("Building the services, the supervisor and the command line (a few minutes the first time):");
-    let mut arguments = vec!["build", "--release", "--bins"];
-    for program in PROGRAMS {
-        arguments.extend(["--package", program]);
-    }
-    cargo(root, &arguments)?;
+    cargo(root, &build_arguments(&PROGRAMS))?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
     Ok(root.join(target).join("release"))
 }
 
-fn demo(once: bool, seed: u64, picture: &Path, kills: u32) -> Result<ExitCode> {
+fn demo(once: bool, seed: u64, picture: &Path, kills: u32, drones: u8) -> Result<ExitCode> {
     let root = checkout()?;
     let programs = build_programs(&root)?;
-    println!("Flying the demo building, seed {seed}:");
+    println!("Flying the demo building, seed {seed}; the page follows as soon as it is built:");
     let mut command = Command::new(programs.join("sereno"));
     command.arg("--deploy").arg(root.join("deploy")).args(["demo", "--seed", &seed.to_string()]);
     command.arg("--picture").arg(picture).args(["--kills", &kills.to_string()]);
+    command.args(["--drones", &drones.to_string()]);
     if once {
         command.arg("--once");
     }
-    let status = command.status().context("cannot run sereno")?;
+    let mut flying = command.spawn().context("cannot run sereno")?;
+    // The drone need not wait for who watches it.
+    let built = if once { Ok(()) } else { cargo(&root, &build_arguments(&WATCHERS)) };
+    if let Err(error) = built {
+        eprintln!("no page: {error:#}");
+    }
+    let status = flying.wait().context("cannot wait for sereno")?;
     Ok(if status.success() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -134,6 +161,7 @@ fn test() -> Result<ExitCode> {
     println!("Running every test: libraries, services, then the whole system as processes.");
     // The system tests run the services as they are flown.
     build_programs(&root)?;
+    cargo(&root, &build_arguments(&WATCHERS))?;
     cargo(&root, &["test", "--workspace", "--no-fail-fast"])?;
     Ok(ExitCode::SUCCESS)
 }

@@ -8,11 +8,14 @@ use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Where a drone and a console listen when nobody else does.
 const BRIDGE_PORT: u16 = 7447;
 const CONSOLE_PORT: u16 = 8443;
+
+/// Between two attempts to start a console.
+const PAUSE: Duration = Duration::from_secs(10);
 
 /// Makes what is missing of a simulated system's certificates, and leaves what is there.
 pub(crate) fn certificates(directory: &Path, drones: &[String], endpoints: &[String]) -> Result<Authority> {
@@ -57,6 +60,8 @@ pub(crate) struct Room {
     pub(crate) berths: Vec<Berth>,
     console: Option<Child>,
     said: Option<Receiver<String>>,
+    /// Not to be started before, after it has ended by itself.
+    again: Instant,
 }
 
 impl Room {
@@ -93,7 +98,7 @@ impl Room {
         // Where the drones are may have changed since the last demo.
         let now_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs().cast_signed();
         authority.client("console", bridge::roles::Standing::Client(bridge::roles::Role::Administrator), &endpoints, now_s)?;
-        Ok(Self { directory, berths, console: None, said: None })
+        Ok(Self { directory, berths, console: None, said: None, again: Instant::now() })
     }
 
     /// Starts the console when its program is there (it may still be built); true when it runs.
@@ -101,8 +106,14 @@ impl Room {
         if self.console.is_some() {
             return Ok(true);
         }
+        if Instant::now() < self.again {
+            return Ok(false);
+        }
+        // Should this fail, it fails the same way a moment later.
+        self.again = Instant::now() + PAUSE;
         let program = std::env::current_exe().context("where am I?")?.with_file_name("sereno-console");
         if !program.is_file() {
+            self.again = Instant::now();
             return Ok(false);
         }
         let port = free_port(CONSOLE_PORT)?;

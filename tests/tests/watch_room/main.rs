@@ -1,0 +1,154 @@
+//! The watch room as a guard has it: a real browser on the page of a real console, on a system of processes that flies in the
+//! simulator. Screenshots are left in `target/screenshots`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests")]
+
+mod browser;
+mod rig;
+
+use browser::Guard;
+use ipc_types::{Phase, PilotState, SticksState, Truth};
+use rig::{LONG, Rig, wait_until};
+use runtime::{Input, Tool};
+use std::time::{Duration, Instant};
+
+const PASSWORD: &str = "a lamp and a bunch of keys";
+
+/// What the drone says of itself, and the truth.
+struct Witness {
+    tool: Tool,
+    state: Input<PilotState>,
+    truth: Input<Truth>,
+    pilot: PilotState,
+    at: Truth,
+}
+
+impl Witness {
+    fn open(rig: &Rig) -> Self {
+        let (manifest, run_dir) = rig.manifest();
+        let mut tool = Tool::join("cli", manifest, &run_dir).unwrap();
+        let (state, truth) = (tool.ports.input().unwrap(), tool.ports.input().unwrap());
+        Self { tool, state, truth, pilot: PilotState::default(), at: Truth::default() }
+    }
+
+    fn look(&mut self) -> (Option<Phase>, Option<SticksState>) {
+        self.tool.tick();
+        while let Some(state) = self.state.receive() {
+            self.pilot = *state;
+        }
+        while let Some(truth) = self.truth.receive() {
+            self.at = *truth;
+        }
+        (Phase::from_code(self.pilot.phase), SticksState::from_code(self.pilot.sticks))
+    }
+
+    fn wait_phase(&mut self, phase: Phase) {
+        wait_until(&format!("the pilot is in phase {phase}"), || self.look().0 == Some(phase));
+    }
+
+    fn wait_sticks(&mut self, sticks: SticksState) {
+        wait_until(&format!("the sticks are {sticks}"), || self.look().1 == Some(sticks));
+    }
+
+    fn speed(&self) -> f32 {
+        self.at.velocity_x_m_s.hypot(self.at.velocity_y_m_s)
+    }
+}
+
+async fn claim(guard: &Guard, rig: &Rig) {
+    guard.fill("code", &rig.claim).await;
+    guard.fill("name", "Ana").await;
+    guard.fill("surname", "Sereno").await;
+    guard.fill("email", "ana@example.org").await;
+    guard.fill("password", PASSWORD).await;
+    guard.picture("claim").await;
+    guard.press("form button[type=submit]").await;
+}
+
+/// The whole story of the issue: claim, watch, start a round, take over, fly, release, land, read the report.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_guard_claims_watches_orders_takes_over_and_reads_the_report() {
+    let rig = Rig::start();
+    let mut drone = Witness::open(&rig);
+    let guard = Guard::open(&rig.address).await;
+    claim(&guard, &rig).await;
+    // The round, by the page's one button for it.
+    guard.press(".dock-primary").await;
+    tokio::task::block_in_place(|| drone.wait_phase(Phase::Autonomous));
+    guard.until("the page says that it flies", "document.body.innerText.includes('Flying')", LONG).await;
+    guard.picture("round-desk").await;
+    guard.size(390, 844).await;
+    guard.picture("round-phone").await;
+    guard.size(1440, 900).await;
+
+    // Taking over: it stops, the sticks are in the middle, it follows while the button is held.
+    guard.press_words("Sticks").await;
+    guard.press(".sticks-take").await;
+    tokio::task::block_in_place(|| {
+        drone.wait_phase(Phase::Manual);
+        drone.wait_sticks(SticksState::Ready);
+    });
+    guard.look("sereno.hold = true").await;
+    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Following));
+    guard.picture("by-hand").await;
+    // Turning is free wherever it stands.
+    guard.look("sereno.axes = [0.8, 0, 0, 0]").await;
+    let before = drone.at.yaw_rad;
+    tokio::task::block_in_place(|| {
+        wait_until("it turns by hand", || {
+            drone.look();
+            (drone.at.yaw_rad - before).sin().abs() > 0.3
+        });
+    });
+    // Frozen: the pad still says the same, and nothing new comes of it.
+    guard.look("sereno.alive = false").await;
+    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Silent));
+    guard.look("(sereno.alive = true, sereno.axes = [0, 0, 0, 0])").await;
+    tokio::task::block_in_place(|| {
+        wait_until("it hovers", || {
+            drone.look();
+            drone.speed() < 0.25
+        });
+    });
+    guard.look("sereno.hold = false").await;
+    let holds = drone.pilot.lease != 0;
+    if holds {
+        guard.press(".sticks-release").await;
+    }
+    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Free));
+    assert_eq!(drone.look().0, Some(Phase::Hover), "nothing resumes by itself");
+
+    guard.press_words("Land").await;
+    tokio::task::block_in_place(|| drone.wait_phase(Phase::Grounded));
+    guard.look("location.hash = '#/reports'").await;
+    guard.until("a report is listed", "document.querySelector('#view a[href^=\"#/reports/\"]') !== null", LONG).await;
+    guard.look("document.querySelector('#view a[href^=\"#/reports/\"]').click()").await;
+    guard.until("the report is read", "document.querySelector('#view').innerText.includes('%')", LONG).await;
+    guard.picture("report").await;
+    guard.close().await;
+}
+
+/// A browser that dies while it flies: hovering 300 ms after the last input, the lease gone at a second (DESIGN 4, and a step
+/// of each of the pilot and whoever tells).
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_browser_that_dies_lets_the_drone_hover_and_holds_nothing() {
+    let rig = Rig::start();
+    let mut drone = Witness::open(&rig);
+    let guard = Guard::open(&rig.address).await;
+    claim(&guard, &rig).await;
+    guard.press(".dock-primary").await;
+    tokio::task::block_in_place(|| drone.wait_phase(Phase::Autonomous));
+    guard.press_words("Sticks").await;
+    guard.press(".sticks-take").await;
+    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Ready));
+    guard.look("sereno.hold = true").await;
+    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Following));
+    let died = Instant::now();
+    guard.kill().await;
+    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Silent));
+    let silent = died.elapsed();
+    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Free));
+    let free = died.elapsed();
+    println!("silent {silent:?}, free {free:?} after the browser was killed");
+    assert!(free >= Duration::from_millis(500), "a lease outlives a hiccup");
+    assert_eq!(drone.look().0, Some(Phase::Hover));
+}
