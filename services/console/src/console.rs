@@ -73,7 +73,7 @@ impl Console {
             Directory::new(store.accounts().await?, store.sessions().await?, config.session.lifetime());
         let salt = random::<16>().map_err(|error| StartError::System(error.to_string()))?;
         let decoy = password::decoy(salt).map_err(|error| StartError::System(error.to_string()))?;
-        let fleet = Fleet::open(&config.zenoh, store.clone(), clock.clone()).await?;
+        let fleet = Fleet::open(&config.zenoh, store.clone(), clock.clone(), &store.drones_seen().await?).await?;
         let app = Arc::new(App::new(store, fleet, page, clock, directory, decoy));
         let places = Places::new(config.https.connections, config.https.connections_an_address);
         let mut tasks = vec![

@@ -5,7 +5,7 @@ use crate::refusal::Refusal;
 use crate::role::is_drone_name;
 use crate::server::Held;
 use crate::secret::{Digest, digest_of};
-use crate::table::{Action, Least, Method, Names, ROUTES, Route};
+use crate::table::{Least, Method, Names, ROUTES, Route};
 use crate::{Account, api, socket};
 use axum::Router;
 use axum::body::{Body, Bytes};
@@ -135,9 +135,9 @@ async fn pass(
         Names::InQuery => query.get("drone").cloned().unwrap_or_default(),
     };
     allow(row, who.as_ref().map(|(account, _)| account), &drone)?;
+    // A page looks by itself; what changes something, a human did.
     if let Some((_, session)) = &who
-        && row.action != Action::SeeSession
-        && !row.is_socket()
+        && row.method != Method::Get
     {
         app.seen(session);
     }

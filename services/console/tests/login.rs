@@ -167,7 +167,7 @@ async fn guessing_is_slowed_down_and_the_rightful_user_is_not_shut_out() {
         bench.pass(Duration::from_secs(30));
     }
     let hours = (bench.clock.0.load(std::sync::atomic::Ordering::SeqCst) - began) as f64 / 3.6e6;
-    assert!(f64::from(guesses) / hours <= 65.0, "{guesses} in {hours} h");
+    assert!(guesses as f64 / hours <= 65.0, "{guesses} in {hours} h");
     // Who knows the password waits for no longer than is promised.
     bench.pass(Duration::from_millis(LONGEST_MS));
     bench.log_in("eva@example.org").await;

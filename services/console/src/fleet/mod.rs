@@ -49,7 +49,7 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Connects to whoever is there now or later.
+    /// Connects to whoever is there now or later; `known` were there before.
     ///
     /// # Errors
     /// When the client's file is wrong. A drone that is not there is no error.
@@ -57,6 +57,7 @@ impl Fleet {
         config: &ZenohConfig,
         store: Store,
         clock: Arc<dyn Clock>,
+        known: &[String],
     ) -> Result<Arc<Self>, LinkError> {
         let link::Link { session, certificate } = link::open(config).await?;
         let fleet = Arc::new(Self {
@@ -67,8 +68,8 @@ impl Fleet {
             clock,
             runtime: Handle::current(),
         });
-        for name in fleet.store.drones_seen().await.unwrap_or_default() {
-            fleet.meet(&name);
+        for name in known {
+            fleet.meet(name);
         }
         // Unbounded: only who has a certificate comes and goes, and losing one would lose a drone.
         let (tokens, mut come) = tokio::sync::mpsc::unbounded_channel::<(String, bool)>();

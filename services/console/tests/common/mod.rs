@@ -10,7 +10,6 @@ use client::Client;
 use console::{Clock, Console, ConsoleConfig, HttpsConfig, Page, Role, SessionConfig, ZenohConfig};
 use drone::Drone;
 use serde_json::{Value, json};
-use std::future::Future;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -37,7 +36,7 @@ pub struct Bench {
 }
 
 /// Waits until `ready` holds; fails with `what` when it never does.
-pub async fn until<F: Future<Output = bool>>(what: &str, mut ready: impl FnMut() -> F) {
+pub async fn until(what: &str, mut ready: impl AsyncFnMut() -> bool) {
     let began = Instant::now();
     while !ready().await {
         assert!(began.elapsed() < DEADLINE, "never: {what}");
