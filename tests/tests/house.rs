@@ -27,12 +27,12 @@ fn house() -> BTreeMap<String, (String, BTreeSet<String>)> {
 
 const LIBRARIES: [&str; 8] =
     ["floorplan", "mcl", "avoid", "patrol", "control", "msp", "manifest", "airframe"];
-const SERVICES: [&str; 9] =
-    ["sonar", "flow", "flight", "localization", "navigation", "pilot", "simulator", "camera", "console"];
+const SERVICES: [&str; 10] =
+    ["sonar", "flow", "flight", "localization", "navigation", "pilot", "simulator", "camera", "console", "stream"];
 /// Who speaks to what is off the board.
 const ZENOH: [&str; 4] = ["bridge", "console", "cli", "sereno-tests"];
 /// Who has an async runtime of its own.
-const TOKIO: [&str; 2] = ["console", "sereno-tests"];
+const TOKIO: [&str; 3] = ["console", "sereno-tests", "stream"];
 
 #[test]
 fn libraries_see_each_other_and_pure_crates_only() {
@@ -111,6 +111,7 @@ fn shells_keep_to_their_family() {
         ("pilot", &[][..]),
         ("simulator", &["rustix"][..]),
         ("camera", &["openh264", "openh264-sys2"][..]),
+        ("stream", &["async-trait", "bytes", "rtc", "serde_json", "tokio", "webrtc"][..]),
         (
             "console",
             &[

@@ -1,2 +1,5 @@
 //! The stream process.
-fn main() {}
+
+fn main() -> std::process::ExitCode {
+    runtime::main::<stream::Stream>(runtime::NoDevices)
+}

@@ -10,10 +10,12 @@ pub(crate) const TRUTH: &str = "sim/truth";
 const OPERATOR: &str = "operator/";
 /// Who watches says so, and several may: the stream, a recorder, a program.
 const WISH: &str = "camera/wish";
+/// What viewers say, by way of the bridge or of a program on the drone.
+const SIGNAL: &str = "signal/in";
 
 /// What people say, through whichever program: such a topic has any number of publishers.
 fn is_said_by_people(topic: &str) -> bool {
-    topic.starts_with(OPERATOR) || topic == WISH
+    topic.starts_with(OPERATOR) || [WISH, SIGNAL].contains(&topic)
 }
 
 impl Manifest {
@@ -117,7 +119,7 @@ impl Manifest {
                 } else if !is_said_by_people(topic) {
                     problem(
                         field,
-                        format!("{topic}: tools may publish only what people say (operator/*, camera/wish)"),
+                        format!("{topic}: tools may publish only what people say (operator/*, camera/wish, signal/in)"),
                     );
                 }
             }

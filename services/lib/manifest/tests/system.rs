@@ -4,7 +4,7 @@
 use manifest::{Criticality, Manifest, ManifestError, Restart, RestartPolicy};
 use std::time::Duration;
 
-const KNOWN: [&str; 20] = [
+const KNOWN: [&str; 27] = [
     "sonar/ranges",
     "flow/motion",
     "sim/ping",
