@@ -181,7 +181,11 @@ impl Core {
         let before = self.mission.heard();
         let obeyed = self.mission.obey(now, command, self.place.as_ref());
         if self.mission.heard() != before {
-            self.say_answer("there is no round to pause");
+            self.say_answer(if self.mission.automatic() {
+                "there is no round to pause"
+            } else {
+                "the automatic is switched off"
+            });
         }
         self.act(obeyed);
     }

@@ -71,6 +71,8 @@ pub struct Mission {
     hold: Option<(f32, f32)>,
     phase: Phase,
     failsafe: FailsafeAction,
+    /// Whether the automatic may move the drone.
+    automatic: bool,
     /// Whether the failsafe that sends home has been answered.
     sent_home: bool,
     flew: bool,
@@ -91,6 +93,7 @@ impl Mission {
             hold: None,
             phase: Phase::Grounded,
             failsafe: FailsafeAction::None,
+            automatic: true,
             sent_home: false,
             flew: false,
             still_s: 0.0,
@@ -138,6 +141,12 @@ impl Mission {
     #[must_use]
     pub fn heard(&self) -> Heard {
         self.heard.unwrap_or(Heard { sequence: 0, stamp_ns: 0, answer: Answer::None })
+    }
+
+    /// Whether the automatic may move the drone.
+    #[must_use]
+    pub fn automatic(&self) -> bool {
+        self.automatic
     }
 
     /// The pilot's phase.
@@ -194,9 +203,16 @@ impl Mission {
     }
 
     fn follow(&mut self, verb: Verb, there: (f32, f32), here: Option<(f32, f32)>) -> (Answer, Option<Event>) {
+        // The pilot says the same a step later.
+        self.automatic = match verb {
+            Verb::AutomaticOff => false,
+            Verb::AutomaticOn => true,
+            _ => self.automatic,
+        };
         match verb {
             // The pilot's alone.
             Verb::TakeOff | Verb::Cut | Verb::SticksRelease | Verb::AutomaticOn => (Answer::Accepted, None),
+            Verb::GoTo | Verb::PatrolStart if !self.automatic => (Answer::Refused, None),
             Verb::Land => {
                 self.stop(PatrolState::Idle, None);
                 (Answer::Accepted, Some(Event::Drop))
@@ -266,6 +282,7 @@ impl Mission {
         let here = place.map(|place| (place.x, place.y));
         self.phase = phase;
         self.failsafe = action;
+        self.automatic = pilot.automatic != 0;
         self.sent_home &= action == FailsafeAction::Return;
         if self.airborne() {
             self.flew = true;

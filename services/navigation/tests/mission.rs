@@ -36,7 +36,8 @@ impl Story {
         self.mission.obey(0, &command, Some(&place(3.0, 3.0)))
     }
     fn pilot(&mut self, phase: Phase, action: FailsafeAction) -> Option<Event> {
-        let state = PilotState { phase: phase.code(), action: action.code(), ..PilotState::default() };
+        let state =
+            PilotState { phase: phase.code(), action: action.code(), automatic: 1, ..PilotState::default() };
         self.mission.hear(&state, Some(&place(3.0, 3.0))).unwrap()
     }
     fn fly(&mut self) {
@@ -118,13 +119,63 @@ fn stop_home_goto_hold_and_land() {
 }
 
 #[test]
+fn a_stop_a_take_over_and_the_automatic_off_pause_the_round_and_end_everything_else() {
+    for verb in [Verb::Stop, Verb::SticksTake, Verb::AutomaticOff] {
+        let mut story = Story::new();
+        story.order(Verb::PatrolStart).unwrap();
+        story.fly();
+        story.mission.route_ready();
+        assert_eq!(story.order(verb), Ok(Some(Event::Drop)), "{verb}");
+        assert_eq!((story.mission.state(), story.mission.goal()), (PatrolState::Paused, Goal::Round));
+        assert_eq!(story.mission.heard().answer, Answer::Accepted);
+        assert_eq!(story.intent(3.0, 3.0, false), Intent::Hover(Some((3.0, 3.0))));
+        let mut story = Story::new();
+        story.fly();
+        story.order_to(Verb::GoTo, 5.0, 6.0).unwrap();
+        assert_eq!(story.order(verb), Ok(Some(Event::Drop)), "{verb}");
+        assert_eq!((story.mission.state(), story.mission.goal()), (PatrolState::Idle, Goal::None));
+    }
+    for verb in [Verb::Cut, Verb::SticksRelease, Verb::AutomaticOn] {
+        let mut story = Story::new();
+        story.fly();
+        story.order_to(Verb::GoTo, 5.0, 6.0).unwrap();
+        assert_eq!(story.order(verb), Ok(None), "{verb} is the pilot's");
+        assert_eq!(story.mission.goal(), Goal::There((5.0, 6.0)));
+    }
+}
+
+#[test]
+fn with_the_automatic_off_no_flight_begins_but_home_and_a_restart_is_told_by_the_pilot() {
+    let off = PilotState { phase: Phase::Hover.code(), automatic: 0, ..PilotState::default() };
+    let mut told = Story::new();
+    told.fly();
+    told.mission.hear(&off, None).unwrap();
+    let mut ordered = Story::new();
+    ordered.fly();
+    ordered.order(Verb::AutomaticOff).unwrap();
+    for mut story in [told, ordered] {
+        for verb in [Verb::PatrolStart, Verb::GoTo] {
+            assert_eq!(story.order_to(verb, 1.0, 2.0), Ok(None), "{verb}");
+            assert_eq!(story.mission.heard().answer, Answer::Refused);
+            assert_eq!(story.mission.goal(), Goal::None);
+        }
+        assert_eq!(story.order(Verb::Home), Ok(Some(Event::Plan)));
+        story.order(Verb::AutomaticOn).unwrap();
+        assert_eq!(story.order_to(Verb::GoTo, 1.0, 2.0), Ok(Some(Event::Plan)));
+    }
+}
+
+#[test]
 fn nonsense_changes_nothing() {
     let mut story = Story::new();
     assert_eq!(story.order_to(Verb::GoTo, f32::NAN, 1.0), Err(Nonsense));
     assert_eq!(story.order_to(Verb::GoTo, 1.0, f32::INFINITY), Err(Nonsense));
     let unknown = Command { verb: 99, command_sequence: 77, ..Command::default() };
     assert_eq!(story.mission.obey(0, &unknown, None), Err(Nonsense));
-    assert_eq!(story.mission.hear(&PilotState { phase: 200, ..PilotState::default() }, None), Err(Nonsense));
+    assert_eq!(
+        story.mission.hear(&PilotState { phase: 200, automatic: 1, ..PilotState::default() }, None),
+        Err(Nonsense)
+    );
     assert_eq!((story.mission.state(), story.mission.heard().sequence), (PatrolState::Idle, 0));
 }
 

@@ -100,7 +100,11 @@ impl Bench {
             };
         }
         self.ranges.publish(&ranges);
-        self.pilot.publish(&PilotState { phase: Phase::Autonomous.code(), ..PilotState::default() });
+        self.pilot.publish(&PilotState {
+            phase: Phase::Autonomous.code(),
+            automatic: 1,
+            ..PilotState::default()
+        });
         self.system.run_until(now);
         let setpoint = self.setpoint.latest().map(|setpoint| *setpoint);
         if let Some(setpoint) = setpoint {
@@ -180,7 +184,7 @@ fn messages_that_make_no_sense_are_counted_and_change_nothing() {
     }
     bench.pose.publish(&Pose { x_m: f32::NAN, estimated_ns: 1, state: 2, ..Pose::default() });
     bench.ranges.publish(&SonarRanges { count: 4000, ..SonarRanges::default() });
-    bench.pilot.publish(&PilotState { phase: 77, ..PilotState::default() });
+    bench.pilot.publish(&PilotState { phase: 77, automatic: 1, ..PilotState::default() });
     bench.command.publish(&Command { verb: 0, command_sequence: 9, ..Command::default() });
     bench.step();
     let setpoint = bench.step().unwrap();

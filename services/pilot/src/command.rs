@@ -1,6 +1,7 @@
 //! What the operator asks for, and why it may be refused.
 
 use crate::core::PilotCore;
+use crate::manual::Holder;
 use crate::senses::age_s;
 use control::{Action, Cause, SpoolUp};
 use core::fmt::Write;
@@ -10,10 +11,13 @@ use ipc_types::{Answer, Command, LinkState, Phase, PilotState, Text, Verb};
 /// in flight they close the sectors for a moment.
 const SIDES_S: f32 = 1.0;
 
-/// Why an order is refused, and what is said of one that is obeyed.
-type Ruling = Result<&'static str, Text<96>>;
+/// What is said of motors that an order has cut.
+pub(crate) const CUT: &str = "motors cut: the operator's order; the drone falls";
 
-fn refused(why: &str) -> Ruling {
+/// Why an order is refused, and what is said of one that is obeyed.
+pub(crate) type Ruling = Result<&'static str, Text<96>>;
+
+pub(crate) fn refused(why: &str) -> Ruling {
     Err(Text::new(why))
 }
 
@@ -60,7 +64,7 @@ impl PilotCore {
             self.refused += 1;
             return;
         }
-        let (answer, text) = match self.obey(now, verb) {
+        let (answer, text) = match self.obey(now, message, verb) {
             Ok(sentence) => (Answer::Accepted, Text::new(sentence)),
             Err(sentence) => (Answer::Refused, sentence),
         };
@@ -73,11 +77,55 @@ impl PilotCore {
         self.changed = true;
     }
 
-    fn obey(&mut self, now: u64, verb: Verb) -> Ruling {
+    fn obey(&mut self, now: u64, command: &Command, verb: Verb) -> Ruling {
+        let ruling = self.rule(now, command, verb);
+        if ruling.is_ok() {
+            self.by_hand.lost_ns = None;
+            if verb != Verb::Stop {
+                self.stop_lands_ns = None;
+            }
+            // Whoever orders the drone to stand or to come down takes it out of the holder's hand.
+            if matches!(verb, Verb::Hold | Verb::Land | Verb::Stop | Verb::Cut) {
+                self.by_hand.lease.revoke();
+            }
+        }
+        ruling
+    }
+
+    fn rule(&mut self, now: u64, command: &Command, verb: Verb) -> Ruling {
         let returning = self.airborne()
             && (self.judged.action, self.judged.cause) == (Action::Return, Cause::BatteryReturn);
+        let holder = self.by_hand.lease.holder().copied();
         match (verb, self.phase) {
+            (Verb::AutomaticOff, _) => Ok(self.automatic_off(now)),
+            (Verb::AutomaticOn, _) => Ok(self.automatic_on()),
             (_, Phase::Cut) => refused("refused: the motors were cut"),
+            (Verb::SticksTake, _) => self.take_sticks(now, command),
+            (Verb::SticksRelease, _) => self.release_sticks(now, command),
+            (Verb::Cut, Phase::Grounded) => refused("refused: the motors are off"),
+            (Verb::Cut, _) => Ok(self.cut(now)),
+            (Verb::Stop | Verb::Hold | Verb::Land, Phase::Grounded) if holder.is_some() => {
+                Ok("the sticks are nobody's: on the ground")
+            }
+            (Verb::Stop, Phase::Grounded) => refused("refused: on the ground"),
+            (Verb::Stop, Phase::Arming) => Ok(self.call_off(now)),
+            (Verb::Stop, Phase::EmergencyLanding) => refused("refused: emergency landing"),
+            (Verb::Stop, _) => Ok(self.stop(now)),
+            // Who holds the sticks takes off by them; everything else would fly beside him.
+            (
+                Verb::TakeOff
+                | Verb::GoTo
+                | Verb::PatrolStart
+                | Verb::PatrolPause
+                | Verb::PatrolStop
+                | Verb::Home,
+                _,
+            ) if holder.is_some_and(|his| verb != Verb::TakeOff || his != Holder::of(command)) => {
+                holder.as_ref().map_or(refused("refused: a human holds the sticks"), Self::held_by)
+            }
+            (Verb::GoTo | Verb::PatrolStart, _) if !self.automatic => {
+                refused("refused: the automatic is switched off")
+            }
             // The table's answer is more severe than these wishes; to come down at once remains free.
             (Verb::Hold | Verb::GoTo | Verb::PatrolStart | Verb::PatrolPause, _) if returning => {
                 refused("refused: returning home, the battery does not last for more")
@@ -135,33 +183,20 @@ impl PilotCore {
                 self.land(now, None);
                 Ok("landing: the operator's order")
             }
-            (Verb::Stop, Phase::Grounded) => refused("refused: on the ground"),
-            (Verb::Stop, Phase::Arming) => Ok(self.call_off(now)),
-            (Verb::Hold | Verb::Stop, Phase::TakeOff) => {
+            (Verb::Hold, Phase::TakeOff) => {
                 self.after_take_off = Phase::Hover;
                 Ok("hovering after the take-off")
             }
-            (Verb::Hold | Verb::Stop, Phase::EmergencyLanding) => refused("refused: emergency landing"),
-            (Verb::Cut, Phase::Grounded) => refused("refused: the motors are off"),
-            (Verb::Cut, _) => {
-                self.enter(now, Phase::Cut);
-                Ok("motors cut: the drone falls")
-            }
-            (Verb::SticksTake | Verb::SticksRelease | Verb::AutomaticOff | Verb::AutomaticOn, _) => {
-                refused("refused: no sticks in this system yet")
-            }
-            (Verb::Hold | Verb::Stop, Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing) => {
-                self.operator_land = false;
-                self.hold = None;
-                self.hold_heading = None;
-                self.enter(now, Phase::Hover);
+            (Verb::Hold, Phase::EmergencyLanding) => refused("refused: emergency landing"),
+            (Verb::Hold, Phase::Hover | Phase::Autonomous | Phase::Manual | Phase::Landing) => {
+                self.stand_still(now);
                 Ok("holding: the operator's order")
             }
         }
     }
 
     /// Starts to arm, or says in a sentence why not.
-    fn try_take_off(&mut self, now: u64, then: Phase) -> Ruling {
+    pub(crate) fn try_take_off(&mut self, now: u64, then: Phase) -> Ruling {
         let mut sentence = Text::<96>::default();
         if self.why_not(now, &mut sentence) {
             return Err(sentence);
@@ -216,7 +251,7 @@ impl PilotCore {
         true
     }
 
-    fn call_off(&mut self, now: u64) -> &'static str {
+    pub(crate) fn call_off(&mut self, now: u64) -> &'static str {
         let why = "take-off called off";
         self.give_up(now, why);
         why

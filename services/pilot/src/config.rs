@@ -23,8 +23,12 @@ pub struct PilotConfig {
     pub expiry_s: f32,
     /// Take-off.
     pub take_off: TakeOffConfig,
+    /// A stop that nobody answers lands the drone after this, seconds.
+    pub stop_lands_s: f32,
     /// Landing.
     pub landing: LandingConfig,
+    /// Flight by hand.
+    pub manual: ManualConfig,
     /// Lift-off.
     pub liftoff: LiftoffConfig,
     /// Touch-down.
@@ -79,6 +83,28 @@ pub struct LandingConfig {
     pub farthest_floor_m: f32,
 }
 
+/// Flight by hand.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ManualConfig {
+    /// Speed at full deflection, m/s; never more than the vehicle's cruise.
+    pub speed_m_s: f32,
+    /// Climb and descent at full deflection, m/s.
+    pub climb_m_s: f32,
+    /// Turn at full deflection, degrees a second.
+    pub turn_deg_s: f32,
+    /// A stick so near to its middle is neutral.
+    pub neutral: f32,
+}
+
+impl Default for ManualConfig {
+    /// The pace of the rounds; a turn that moves no sonar's cone by more than its width between two of its pings; and the
+    /// play of a worn gamepad's sticks.
+    fn default() -> Self {
+        Self { speed_m_s: 0.5, climb_m_s: 0.3, turn_deg_s: 45.0, neutral: 0.08 }
+    }
+}
+
 impl Default for PilotConfig {
     fn default() -> Self {
         Self {
@@ -87,7 +113,9 @@ impl Default for PilotConfig {
             min_height_m: 0.9,
             min_clearance_m: 0.3,
             expiry_s: 0.12,
+            stop_lands_s: 30.0,
             take_off: TakeOffConfig::default(),
+            manual: ManualConfig::default(),
             landing: LandingConfig::default(),
             liftoff: LiftoffConfig::default(),
             touch_down: TouchDownConfig::default(),
@@ -150,6 +178,11 @@ impl Validate for PilotConfig {
         within("min_clearance_m", f(self.min_clearance_m), 0.1..=0.6)?;
         // flight's ladder calls channels stale after 100 ms at the earliest, at the latest it must see it.
         within("expiry_s", f(self.expiry_s), 0.06..=0.2)?;
+        within("stop_lands_s", f(self.stop_lands_s), 5.0..=300.0)?;
+        within("manual.speed_m_s", f(self.manual.speed_m_s), 0.1..=1.0)?;
+        within("manual.climb_m_s", f(self.manual.climb_m_s), 0.05..=0.5)?;
+        within("manual.turn_deg_s", f(self.manual.turn_deg_s), 5.0..=90.0)?;
+        within("manual.neutral", f(self.manual.neutral), 0.02..=0.3)?;
         within("take_off.arming_s", f(self.take_off.arming_s), 1.0..=15.0)?;
         within("take_off.cell_volts", f(self.take_off.cell_volts), 3.3..=4.1)?;
         if self.take_off.hover_us != 0.0 {

@@ -3,6 +3,7 @@
 use crate::command::Heard;
 use crate::config::PilotConfig;
 use crate::ground::Below;
+use crate::manual::ByHand;
 use crate::senses::{AttitudeSeen, DownSeen, FlightSeen, PoseSeen, SetpointSeen, UNSEEN_S, age_s};
 use control::{
     ClimbController, Delay, Failsafe, FloorTrail, Footing, HeightEstimator, Held, Judgement, Motion, Shield,
@@ -148,6 +149,13 @@ pub struct PilotCore {
     pub(crate) hover_known: bool,
     pub(crate) resumed: bool,
     pub(crate) operator_land: bool,
+    pub(crate) by_hand: ByHand,
+    /// When a stop that nobody answers lands the drone.
+    pub(crate) stop_lands_ns: Option<u64>,
+    /// Whether the automatic may move the drone.
+    pub(crate) automatic: bool,
+    /// The motors were cut by an order.
+    pub(crate) cut_ordered: bool,
     pub(crate) blind_since_ns: Option<u64>,
     pub(crate) aside_s: f32,
     /// Where the floor was seen that a landing goes to first, in the floor trail's frame.
@@ -212,6 +220,10 @@ impl PilotCore {
             hover_known: false,
             resumed: false,
             operator_land: false,
+            by_hand: ByHand::default(),
+            stop_lands_ns: None,
+            automatic: true,
+            cut_ordered: false,
             blind_since_ns: None,
             aside_s: 0.0,
             lands_at: None,

@@ -3,7 +3,7 @@
 use crate::core::PilotCore;
 use crate::senses::age_s;
 use control::{Condition, Flags};
-use ipc_types::{LinkState, Phase};
+use ipc_types::LinkState;
 
 /// A velocity that is less certain is not known, m/s: a hover drifts through a room in ten seconds.
 const DRIFTS_M_S: f32 = 0.25;
@@ -31,6 +31,7 @@ impl PilotCore {
     /// What is so now.
     fn flags(&mut self, now: u64) -> Flags {
         let uncovered = self.home_uncovered(now);
+        let silent_s = self.operator_silent_s(now);
         let policy = &self.config.failsafe;
         let airborne = self.airborne();
         let cell = self.cell_volts(now);
@@ -46,8 +47,7 @@ impl PilotCore {
         let under = |volts: f32| cell.is_some_and(|cell| cell < volts);
         let mut flags = Flags::default();
         flags.set(Condition::NavigationSilent, self.fresh_setpoint(now).is_none());
-        // No port brings sticks: whoever were to fly by hand would not be heard.
-        flags.set(Condition::OperatorSilent, self.phase == Phase::Manual);
+        flags.set_lasted(Condition::OperatorSilent, silent_s);
         flags.set(Condition::SideSonarSilent, silent > 0);
         flags.set(Condition::AllSonarsSilent, sides > 0 && silent == sides);
         flags.set(Condition::PoseUncertain, !place_known && !searching);

@@ -46,7 +46,9 @@ impl PilotCore {
         self.last_step_ns = Some(now);
         self.adopt(now);
         self.carry(now, dt);
+        self.watch_hand(now);
         self.judge(now);
+        self.mind_the_table(now);
         self.advance(now, dt);
         self.decided = match self.phase {
             Phase::Grounded | Phase::Cut => Decided::NEUTRAL,
@@ -146,7 +148,13 @@ impl PilotCore {
     /// The horizontal wish (plan frame), whose it is, and when it expires.
     fn wish(&mut self, now: u64) -> (Wish, Source, u64) {
         let setpoint = self.fresh_setpoint(now).filter(|_| self.phase == Phase::Autonomous);
-        let asking = Asking { airborne: true, navigation: setpoint.is_some(), failsafe: self.judged.action };
+        let sticks = self.followed();
+        let asking = Asking {
+            airborne: true,
+            navigation: setpoint.is_some(),
+            sticks: sticks.is_some(),
+            failsafe: self.judged.action,
+        };
         let source = arbitrate(&asking);
         let place = self.place_known();
         let mut expiry_ns = u64::MAX;
@@ -166,6 +174,15 @@ impl PilotCore {
                 (_, Some(hold)) => self.hold = Some(hold),
                 (_, None) => self.settle(),
             }
+        } else if let (Source::Manual, Some(sticks)) = (source, sticks) {
+            expiry_ns = self.flown_until(&sticks);
+            if let Some(velocity) = self.asked_velocity(&sticks) {
+                self.hold = None;
+                return (Wish::to(velocity), source, expiry_ns);
+            }
+            self.settle();
+        } else if self.phase == Phase::Manual {
+            self.settle();
         } else if source == Source::Failsafe && self.phase == Phase::Autonomous {
             // Standing still where it stopped, not where navigation last wanted it.
             if self.hold.is_some_and(|hold| (hold - self.motion.place()).norm() > 0.5) {
@@ -244,13 +261,18 @@ impl PilotCore {
         let throttle_us = self.throttle(now, dt);
         let wanted = *self.hold_heading.get_or_insert(heading);
         let seen = age_s(self.attitude.at, now) < UNSEEN_S;
-        let turn = if seen { yaw_rate(&self.config.heading, wanted, heading) } else { 0.0 };
+        let turn = match self.asked_turn().filter(|_| source == Source::Manual) {
+            _ if !seen => 0.0,
+            Some(turn) => turn,
+            None => yaw_rate(&self.config.heading, wanted, heading),
+        };
         Decided {
             arm: true,
             source: match source {
                 Source::Neutral => ChannelSource::Neutral,
                 Source::Pilot => ChannelSource::Pilot,
                 Source::Navigation => ChannelSource::Navigation,
+                Source::Manual => ChannelSource::Manual,
                 Source::Failsafe => ChannelSource::Failsafe,
             },
             roll_us: stick::of_angle(roll),
@@ -311,10 +333,16 @@ impl PilotCore {
                     .edge_m(now)
                     .map_or(self.height.surface_m(), |edge| edge.max(self.height.surface_m()));
                 let least = c.min_height_m.min(c.height_m);
-                let wish = self.height_wish_m.max(below + c.min_clearance_m).clamp(least, c.max_height_m);
-                let now_m = self.height.height_m();
+                let (low, high) = ((below + c.min_clearance_m).clamp(least, c.max_height_m), c.max_height_m);
                 let reach = HEIGHT_SLEW_M_S / c.climb.height_gain_per_s;
-                (VerticalWish::Height(wish.clamp(now_m - reach, now_m + reach)), true)
+                let now_m = self.height.height_m();
+                match self.asked_climb(low, high) {
+                    Some(rate) => (VerticalWish::Rate(rate), true),
+                    None => {
+                        let wish = self.height_wish_m.clamp(low, high);
+                        (VerticalWish::Height(wish.clamp(now_m - reach, now_m + reach)), true)
+                    }
+                }
             }
         };
         let throttle_us = self.climb.step(dt, wish, &mut self.height, tilt, learn && !self.frozen);

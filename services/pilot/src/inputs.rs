@@ -95,7 +95,7 @@ impl PilotCore {
         let pad = Vector::new(message.pad_x_m, message.pad_y_m);
         let flies =
             !matches!(known, None | Some(PatrolState::Idle | PatrolState::Done | PatrolState::Failed));
-        if self.resumed && self.phase == Phase::TakeOff && flies {
+        if self.resumed && self.phase == Phase::TakeOff && flies && self.automatic {
             // What the interrupted take-off was for: navigation remembers its round.
             self.after_take_off = Phase::Autonomous;
         }

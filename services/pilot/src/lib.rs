@@ -11,12 +11,14 @@ mod evidence;
 mod flying;
 mod ground;
 mod inputs;
+mod manual;
 mod phases;
 mod report;
 mod resume;
 mod senses;
 mod service;
+mod standing;
 
-pub use crate::config::{LandingConfig, PilotConfig, TakeOffConfig};
+pub use crate::config::{LandingConfig, ManualConfig, PilotConfig, TakeOffConfig};
 pub use crate::core::{Craft, PilotCore};
 pub use crate::service::Pilot;

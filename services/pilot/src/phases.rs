@@ -1,7 +1,7 @@
 //! From phase to phase.
 
 use crate::core::{Decided, PilotCore};
-use crate::senses::age_s;
+use crate::senses::{LEAST_LEFT_NS, age_s};
 use control::{Action, Cause, Liftoff, TouchDown, Vector};
 use core::fmt::Write;
 use ipc_types::{LinkState, Phase, SetpointKind, Text};
@@ -22,10 +22,6 @@ const BLIND_MORE_S: f32 = 5.0;
 /// Who should stand by the reckoning gets so much less collective than that says: 0.12 m/s2. Where the reckoning was wrong
 /// about the climb there may be a metre left, and motors that stop there are a crash.
 pub(crate) const BLIND_SHORT: f32 = 0.994;
-
-/// A setpoint that holds for less is used no more, nanoseconds: channels made from it would expire before the next ones,
-/// a tick of 20 ms later and as much late again, have reached the controller.
-const LEAST_LEFT_NS: u64 = 40_000_000;
 
 impl PilotCore {
     /// One transition at most a step.
@@ -55,14 +51,18 @@ impl PilotCore {
                     self.lands_at = self.floor_to_land_on();
                     self.say_failsafe("emergency landing");
                 }
-                Action::Return => self.turn_home(now),
+                // Who stopped the drone is asked first.
+                Action::Return if self.stop_lands_ns.is_none() => self.turn_home(now),
                 _ => {}
             }
         }
         match self.phase {
             Phase::Arming => self.arming(now),
             Phase::TakeOff => self.taking_off(now, dt),
-            Phase::Hover => self.settle(),
+            Phase::Hover => {
+                self.settle();
+                self.answer_stop(now);
+            }
             Phase::Autonomous => {
                 if let Some(setpoint) = self.fresh_setpoint(now)
                     && setpoint.kind == SetpointKind::Land
@@ -113,10 +113,15 @@ impl PilotCore {
         let Some(spool) = &mut self.spool else {
             let there = (self.height.height_m() - self.config.height_m).abs() < THERE_M;
             if there || self.phase_s(now) > CLIMB_S {
-                self.enter(now, self.after_take_off);
+                if self.by_hand.lease.holder().is_some() {
+                    self.fly_by_hand(now);
+                } else {
+                    self.enter(now, self.after_take_off);
+                }
                 match (self.phase, self.judged.action) {
                     (Phase::Autonomous, Action::Return) => self.say_failsafe("returning home"),
                     (Phase::Autonomous, _) => self.say("following navigation"),
+                    (Phase::Manual, _) => self.say("by hand: stopping first"),
                     _ => self.say("hovering"),
                 }
             }
@@ -142,6 +147,7 @@ impl PilotCore {
     /// Begins to come down over a place, or over where it stands.
     pub(crate) fn land(&mut self, now: u64, place: Option<Vector>) {
         self.spool = None;
+        self.stop_lands_ns = None;
         self.touch = TouchDown::default();
         self.blind_since_ns = None;
         // In a hover the drone stands over its place already; out of a flight it lands where it stops.
@@ -216,6 +222,9 @@ impl PilotCore {
     pub(crate) fn stand(&mut self, now: u64, why: &str) {
         self.spool = None;
         self.operator_land = false;
+        self.stop_lands_ns = None;
+        self.by_hand.lost_ns = None;
+        self.cut_ordered = false;
         self.hold = None;
         self.hold_heading = None;
         self.decided = Decided::NEUTRAL;

@@ -1,8 +1,10 @@
 //! What the pilot says: channels and state.
 
 use crate::core::PilotCore;
-use control::{Action, Cause, Loss, stick};
-use ipc_types::{Channels, FailsafeAction, FailsafeCause, Phase, PilotState, nanoseconds};
+use control::{Action, Cause, Hand, Loss, stick};
+use ipc_types::{
+    Channels, FailsafeAction, FailsafeCause, Phase, PilotState, SticksState, Text, nanoseconds,
+};
 
 /// Channels that are filled: four sticks, AUX1 (arm), AUX2 (angle).
 const CHANNELS: usize = 6;
@@ -35,6 +37,18 @@ pub(crate) fn cause(cause: Cause) -> FailsafeCause {
         Cause::LinkDown => FailsafeCause::LinkDown,
         Cause::Tilt => FailsafeCause::Tilt,
         Cause::Operator => FailsafeCause::Operator,
+    }
+}
+
+/// The message's word for how far a human has the drone in hand.
+pub(crate) fn sticks_state(hand: Hand) -> SticksState {
+    match hand {
+        Hand::Free => SticksState::Free,
+        Hand::Stopping => SticksState::Stopping,
+        Hand::AwaitingNeutral => SticksState::AwaitingNeutral,
+        Hand::Ready => SticksState::Ready,
+        Hand::Following => SticksState::Following,
+        Hand::Silent => SticksState::Silent,
     }
 }
 
@@ -118,8 +132,26 @@ impl PilotCore {
         out.hold_y_m = self.hold.map_or(nowhere, |hold| hold.y);
         out.hold_heading_rad = self.hold_heading.unwrap_or(nowhere);
         out.shield_speed_m_s = self.decided.shield_speed_m_s;
-        out.holder = ipc_types::Text::default();
+        self.write_hand(out);
         out.text = self.text;
+    }
+
+    /// Who holds the sticks, and what was ordered of them.
+    fn write_hand(&self, out: &mut PilotState) {
+        let lease = &self.by_hand.lease;
+        let holder = lease.holder();
+        out.lease = lease.number();
+        out.holder = holder.map_or_else(Text::default, |holder| holder.account);
+        out.holder_socket = holder.map_or(0, |holder| holder.socket);
+        out.sticks = sticks_state(lease.hand()).code();
+        let age_s = self.last_step_ns.and_then(|now| lease.age_s(now));
+        out.sticks_age_ms = age_s.map_or(f32::NAN, |age_s| age_s * 1000.0);
+        out.automatic = u8::from(self.automatic);
+        out.stop_lands_ns = self.stop_lands_ns.unwrap_or(0);
+        if self.phase == Phase::Cut && self.cut_ordered {
+            out.cause = FailsafeCause::Operator.code();
+            out.action = FailsafeAction::Cut.code();
+        }
     }
 
     /// Whether the state has changed in a way that must be known at once; asking clears it.
@@ -128,7 +160,7 @@ impl PilotCore {
     }
 
     /// One sentence for `sereno ps`.
-    pub fn write_status(&self, out: &mut ipc_types::Text<96>) {
+    pub fn write_status(&self, out: &mut Text<96>) {
         use core::fmt::Write;
         // What does not fit is cut.
         let _ = match (self.phase, self.judged.action) {

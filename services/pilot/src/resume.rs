@@ -1,9 +1,9 @@
 //! Going on after a restart in the air.
 
-use crate::command::Heard;
+use crate::command::{CUT, Heard};
 use crate::core::PilotCore;
 use crate::report::{action_of, cause_of};
-use control::{Cause, Failsafe, SpoolUp, Tilt, Vector, stick};
+use control::{Cause, Failsafe, Lease, SpoolUp, Tilt, Vector, stick};
 use ipc_types::{Phase, PilotState};
 
 /// A climb is reckoned on for at most so long, seconds: a restart takes a tenth of it.
@@ -18,6 +18,9 @@ impl PilotCore {
             return;
         };
         self.heard = Heard::before(now, state);
+        // Whoever held the sticks holds them no longer, and the number of his lease does not come again.
+        self.by_hand.lease = Lease::after(state.lease);
+        self.automatic = state.automatic != 0;
         if (1120.0..=1800.0).contains(&state.hover_throttle_us) {
             self.climb.set_hover(state.hover_throttle_us);
         }
@@ -30,7 +33,8 @@ impl PilotCore {
         self.judged = self.failsafe.judged();
         if phase == Phase::Cut {
             self.enter(now, phase);
-            self.say("motors cut: tilted over");
+            self.cut_ordered = cause == Cause::Operator;
+            self.say(if self.cut_ordered { CUT } else { "motors cut: tilted over" });
             return;
         }
         let trim = |us: f32| if us.is_finite() { stick::angle_of(us).clamp(-0.087, 0.087) } else { 0.0 };
@@ -39,6 +43,9 @@ impl PilotCore {
         self.hold_heading = state.hold_heading_rad.is_finite().then_some(state.hold_heading_rad);
         self.hold = Vector::new(state.hold_x_m, state.hold_y_m).known();
         self.operator_land = cause == Cause::Operator;
+        let longest_ns = ipc_types::nanoseconds(f64::from(self.config.stop_lands_s));
+        self.stop_lands_ns =
+            Some(state.stop_lands_ns).filter(|at| *at > 0).map(|at| at.min(now.saturating_add(longest_ns)));
         self.last_step_ns = Some(now);
         // It went on climbing meanwhile.
         let age_s = ipc_types::seconds_between(state.header.stamp_ns, now).clamp(0.0, LONGEST_AWAY_S) as f32;
@@ -57,6 +64,8 @@ impl PilotCore {
             Phase::Manual => {
                 // Nothing resumes by itself after manual control.
                 self.hold = None;
+                let height_m = state.height_m.max(self.config.min_height_m);
+                self.height_wish_m = height_m.min(self.config.max_height_m);
                 self.enter(now, Phase::Hover);
             }
             _ => self.enter(now, phase),

@@ -1,9 +1,9 @@
 //! What has been heard last, checked.
 
-use control::{GRAVITY_M_S2, Tilt, Vector, wrap_angle};
+use control::{Axes, GRAVITY_M_S2, StickInput, Tilt, Vector, wrap_angle};
 use ipc_types::{
-    Attitude, FlightState, Ladder, LinkState, LocalizationState, Pose, Power, Setpoint, SetpointKind, Text,
-    seconds_between,
+    ArmSwitch, Attitude, FlightState, Ladder, LinkState, HEADING_HOLD, HEIGHT_HOLD, LocalizationState, Pose, Power, Setpoint,
+    SetpointKind, Sticks, Text, nanoseconds, seconds_between,
 };
 
 /// Seconds from a stamp to now; infinite without one.
@@ -205,6 +205,44 @@ pub(crate) struct SetpointSeen {
 
 /// A setpoint that claims to hold for longer is cut to this, nanoseconds: navigation decides 20 times a second.
 const LONGEST_NS: u64 = 500_000_000;
+
+/// A wish that holds for less is used no more, nanoseconds: channels made from it would expire before the next ones, a
+/// tick of 20 ms later and as much late again, have reached the controller.
+pub(crate) const LEAST_LEFT_NS: u64 = 40_000_000;
+
+/// Sticks that were older when they were sent are no sticks, milliseconds: the longest lease is half of it.
+const OLDEST_MS: f32 = 10_000.0;
+/// A message may be this much newer than the step that takes it, nanoseconds: a step reads the clock before its inputs.
+const AHEAD_NS: u64 = 100_000_000;
+
+/// Reads sticks; `None` when something in them makes no sense.
+pub(crate) fn sticks(now: u64, message: &Sticks) -> Option<StickInput> {
+    let axes = Axes::checked(message.forward, message.left, message.up, message.turn)?;
+    let sent_ns = message.header.stamp_ns;
+    if !(0.0..=OLDEST_MS).contains(&message.age_ms) || sent_ns > now.saturating_add(AHEAD_NS) {
+        return None;
+    }
+    let arm = match u8::try_from(message.arm).ok().and_then(ArmSwitch::from_code)? {
+        ArmSwitch::Absent => None,
+        ArmSwitch::Off => Some(false),
+        ArmSwitch::On => Some(true),
+    };
+    let held = match message.held {
+        0 => false,
+        1 => true,
+        _ => return None,
+    };
+    Some(StickInput {
+        lease: message.lease,
+        sequence: message.input_sequence,
+        made_ns: sent_ns.min(now).saturating_sub(nanoseconds(f64::from(message.age_ms) * 1e-3)),
+        axes,
+        held,
+        height_hold: message.switches & HEIGHT_HOLD != 0,
+        heading_hold: message.switches & HEADING_HOLD != 0,
+        arm,
+    })
+}
 
 impl SetpointSeen {
     pub(crate) fn read(message: &Setpoint) -> Option<Self> {

@@ -5,7 +5,7 @@ use crate::core::{Craft, PilotCore};
 use floorplan::DistanceField;
 use ipc_types::{
     Attitude, Channels, Command, FlightState, FlowMotion, Grid, Patrol, PilotState, Pose, Power, Setpoint,
-    SonarRanges, Text,
+    SonarRanges, Sticks, Text,
 };
 use runtime::{Input, Output, Ports, Service, Start, StartError};
 
@@ -28,6 +28,7 @@ pub struct Pilot {
     state: Input<FlightState>,
     power: Input<Power>,
     command: Input<Command>,
+    sticks: Input<Sticks>,
     channels: Output<Channels>,
     report: Output<PilotState>,
     said_ns: Option<u64>,
@@ -60,6 +61,7 @@ impl Service for Pilot {
             state: ports.input()?,
             power: ports.input()?,
             command: ports.input()?,
+            sticks: ports.input()?,
             channels: ports.output()?,
             report: ports.output()?,
             retained: ports.retained()?,
@@ -101,6 +103,9 @@ impl Service for Pilot {
         }
         while let Some(message) = self.command.receive() {
             core.command(now, &message);
+        }
+        while let Some(message) = self.sticks.receive() {
+            core.sticks(now, &message);
         }
         core.step(now);
         if core.fills_channels()

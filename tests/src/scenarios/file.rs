@@ -1,5 +1,6 @@
 //! The files.
 
+use super::guard::Guard;
 use airframe::controller::Firmware;
 use airframe::simulation::faults::Fault;
 use anyhow::{Context, Result, bail, ensure};
@@ -50,6 +51,8 @@ pub struct Scenario {
     /// What breaks.
     #[serde(default)]
     pub faults: Vec<Fault>,
+    /// Who takes the sticks, if anybody does.
+    pub guard: Option<Guard>,
     /// What must come of it.
     pub expect: Expectation,
 }
@@ -82,6 +85,10 @@ pub enum Order {
     Home,
     /// Land here.
     Land,
+    /// Brake, hover, and land if nobody answers.
+    Stop,
+    /// Nothing automatic begins any more.
+    AutomaticOff,
 }
 
 impl Order {
@@ -95,6 +102,8 @@ impl Order {
             Self::Hold => Verb::Hold,
             Self::Home => Verb::Home,
             Self::Land => Verb::Land,
+            Self::Stop => Verb::Stop,
+            Self::AutomaticOff => Verb::AutomaticOff,
         }
     }
 }
@@ -140,6 +149,14 @@ pub struct Expectation {
     pub reaches_m: Option<f32>,
     /// Never higher above the floor, metres.
     pub height_m: Option<f32>,
+    /// It follows the sticks for at least so long, seconds.
+    pub by_hand_s: Option<f64>,
+    /// And at most so long.
+    pub by_hand_at_most_s: Option<f64>,
+    /// It flies at least so far by them, metres.
+    pub by_hand_m: Option<f64>,
+    /// Whether somebody holds the sticks at the end.
+    pub held: Option<bool>,
     /// Most times that the motors are armed.
     pub armings: Option<u32>,
 }
@@ -215,6 +232,9 @@ impl Scenario {
                 "`to` belongs to goto, and goto needs it"
             );
         }
+        if let Some(guard) = &self.guard {
+            guard.check()?;
+        }
         ensure!(self.expect != Expectation::default(), "expect is empty: the scenario cannot fail");
         self.expect.check()
     }
@@ -233,10 +253,13 @@ impl Scenario {
         }
     }
 
-    /// When the first fault begins, seconds after the take-off; 0 when one is there from the start, or there is none.
+    /// When the first fault begins, of the drone or of the guard's link, seconds after the take-off; 0 when one is there
+    /// from the start, or there is none.
     #[must_use]
     pub fn trouble_s(&self) -> f64 {
-        let first = self.faults.iter().map(|fault| fault.from_s.unwrap_or(0.0)).fold(f64::INFINITY, f64::min);
+        let links = self.guard.iter().flat_map(|guard| guard.link.iter().map(|link| link.from_s));
+        let faults = self.faults.iter().map(|fault| fault.from_s.unwrap_or(0.0));
+        let first = faults.chain(links).fold(f64::INFINITY, f64::min);
         if first.is_finite() { first } else { 0.0 }
     }
 

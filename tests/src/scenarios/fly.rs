@@ -1,5 +1,6 @@
 //! One scenario in lockstep.
 
+use super::guard::{self, AtTheSticks};
 use super::{Scenario, Seen};
 use crate::checkout;
 use anyhow::{Context, Result};
@@ -49,7 +50,14 @@ pub fn fly(scenario: &Scenario, cache: &Cache) -> Result<Flown> {
     setup.simulator = scenario.simulator();
     runtime::Validate::validate(&setup.simulator).with_context(|| scenario.name.clone())?;
     setup.cache = cache.clone();
+    if scenario.guard.is_some() {
+        guard::admit(&mut setup.manifest);
+    }
     let mut flight = Flight::start(&setup, scenario.seed).with_context(|| scenario.name.clone())?;
+    let mut guard = match &scenario.guard {
+        Some(guard) => Some(AtTheSticks::open(guard.clone(), &mut flight, scenario.seed)?),
+        None => None,
+    };
     let mut seen = Seen::default();
     look_for(&mut flight, &mut seen, scenario, BEGIN_S);
     let mut orders = scenario.orders.iter().peekable();
@@ -65,6 +73,9 @@ pub fn fly(scenario: &Scenario, cache: &Cache) -> Result<Flown> {
             flight.order(order.order.verb(), x, y);
             // Orders are numbered by the millisecond.
             look_for(&mut flight, &mut seen, scenario, LOOK_S);
+        }
+        if let (Some(guard), Some(flown_s)) = (&mut guard, flown_s) {
+            guard.act(flown_s, flight.witness.last_pilot.as_ref());
         }
         look_for(&mut flight, &mut seen, scenario, LOOK_S);
         let grounded = flight.witness.phase() == Phase::Grounded.word();

@@ -89,6 +89,27 @@ fn ending(scenario: &Scenario, seen: &Seen, told: &mut Told) {
             format!("expected it down by {by} s, saw it down after {}", or_never(seen.ended_s))
         });
     }
+    if let Some(least) = expect.by_hand_s {
+        told.unless(seen.by_hand_s >= least, || {
+            format!("expected at least {least} s by hand, saw {:.1} s", seen.by_hand_s)
+        });
+    }
+    if let Some(most) = expect.by_hand_at_most_s {
+        told.unless(seen.by_hand_s <= most, || {
+            format!("expected at most {most} s by hand, saw {:.1} s", seen.by_hand_s)
+        });
+    }
+    if let Some(least) = expect.by_hand_m {
+        told.unless(seen.by_hand_m >= least, || {
+            format!("expected at least {least} m by hand, saw {:.2} m", seen.by_hand_m)
+        });
+    }
+    if let Some(held) = expect.held {
+        told.unless(seen.held == held, || {
+            let word = |held| if held { "held" } else { "nobody's" };
+            format!("expected the sticks to be {} at the end, saw them {}", word(held), word(seen.held))
+        });
+    }
     if let Some(most) = expect.armings {
         told.unless(seen.armings <= most, || {
             format!("expected at most {most} armings, saw {}", seen.armings)

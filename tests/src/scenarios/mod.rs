@@ -7,12 +7,14 @@
 
 mod file;
 mod fly;
+mod guard;
 mod judge;
 mod run;
 mod seen;
 
 pub use file::{Expectation, Order, OrderAt, Scenario, load_all, load_known};
 pub use fly::{Flown, fly};
+pub use guard::{Guard, Link, Move};
 pub use judge::failures;
 pub use run::{Outcome, Report, Settings, Verdict, run};
 pub use seen::{FailsafeSeen, Seen};

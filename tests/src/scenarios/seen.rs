@@ -2,7 +2,7 @@
 
 use super::Scenario;
 use cli::flight::Flight;
-use ipc_types::{FailsafeAction, FailsafeCause, Truth};
+use ipc_types::{FailsafeAction, FailsafeCause, SticksState, Truth};
 use serde::Serialize;
 
 /// Slower than this it stands, horizontally: a hover sways by some 0.1 m/s, m/s.
@@ -68,6 +68,12 @@ pub struct Seen {
     pub goal_m: Option<f32>,
     /// Highest above the floor, metres.
     pub height_m: f32,
+    /// For how long it followed the sticks, seconds.
+    pub by_hand_s: f64,
+    /// How far it flew by them, metres.
+    pub by_hand_m: f64,
+    /// Whether somebody held the sticks at the end.
+    pub held: bool,
     /// How often the motors were armed.
     pub armings: u32,
     /// For each fault: it was there from the start, or began in the air.
@@ -79,6 +85,7 @@ pub struct Seen {
 /// What is remembered from one look to the next.
 #[derive(Clone, Debug, Default)]
 struct Trail {
+    at_s: f64,
     armed: bool,
     airborne: bool,
     standing_since_s: Option<f64>,
@@ -97,7 +104,16 @@ impl Seen {
             }
         }
         let at_s = truth.time_s - self.took_off_s.unwrap_or(truth.time_s);
+        let before = (self.place, self.trail.at_s);
         self.place = (truth.x_m, truth.y_m);
+        self.trail.at_s = at_s;
+        if let Some(pilot) = flight.witness.last_pilot {
+            self.held = pilot.lease != 0;
+            if pilot.sticks == SticksState::Following.code() {
+                self.by_hand_s += at_s - before.1;
+                self.by_hand_m += f64::from((self.place.0 - before.0.0).hypot(self.place.1 - before.0.1));
+            }
+        }
         let pad = flight.world.pad();
         self.off_pad_m = (truth.x_m - pad.x).hypot(truth.y_m - pad.y);
         self.clearance_m = truth.min_clearance_m;

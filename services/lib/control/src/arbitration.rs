@@ -11,6 +11,8 @@ pub enum Source {
     Pilot,
     /// Navigation's setpoint.
     Navigation,
+    /// Of who holds the sticks.
+    Manual,
     /// A failsafe's.
     Failsafe,
 }
@@ -22,11 +24,14 @@ pub struct Asking {
     pub airborne: bool,
     /// The phase follows navigation, and its setpoint has not expired.
     pub navigation: bool,
+    /// The sticks are followed.
+    pub sticks: bool,
     /// What the failsafe table says.
     pub failsafe: Action,
 }
 
-/// The most severe wins: a failsafe that stops or lands beats navigation, which beats the pilot's own hover.
+/// The most severe wins: a failsafe that moves the drone beats the sticks, one that stops or lands beats navigation, and
+/// these beat the pilot's own hover. Nobody follows navigation and the sticks at the same time.
 /// [`Action::Return`] is flown *by* navigation, whose shield and route it needs; without a fresh setpoint the
 /// failsafe itself hovers.
 #[must_use]
@@ -34,9 +39,10 @@ pub fn arbitrate(asking: &Asking) -> Source {
     if !asking.airborne {
         return Source::Neutral;
     }
-    match (asking.failsafe, asking.navigation) {
-        (Action::None | Action::Return, true) => Source::Navigation,
-        (Action::None, false) => Source::Pilot,
+    match (asking.failsafe, asking.navigation, asking.sticks) {
+        (Action::None, _, true) => Source::Manual,
+        (Action::None | Action::Return, true, _) => Source::Navigation,
+        (Action::None, false, false) => Source::Pilot,
         _ => Source::Failsafe,
     }
 }
@@ -48,11 +54,12 @@ mod tests {
     #[test]
     fn the_most_severe_wins() {
         for &failsafe in Action::ALL {
-            for navigation in [false, true] {
-                let on_ground = arbitrate(&Asking { airborne: false, navigation, failsafe });
+            for (navigation, sticks) in [(false, false), (true, false), (false, true), (true, true)] {
+                let on_ground = arbitrate(&Asking { airborne: false, navigation, sticks, failsafe });
                 assert_eq!(on_ground, Source::Neutral);
-                let source = arbitrate(&Asking { airborne: true, navigation, failsafe });
+                let source = arbitrate(&Asking { airborne: true, navigation, sticks, failsafe });
                 let expected = match failsafe {
+                    Action::None if sticks => Source::Manual,
                     Action::None if navigation => Source::Navigation,
                     Action::None => Source::Pilot,
                     Action::Return if navigation => Source::Navigation,

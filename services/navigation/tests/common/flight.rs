@@ -159,7 +159,7 @@ impl Flight {
             ranges.count += 1;
         }
         self.core.ranges(&ranges);
-        self.core.pilot(&PilotState { phase: self.phase.code(), ..PilotState::default() });
+        self.core.pilot(&PilotState { phase: self.phase.code(), automatic: 1, ..PilotState::default() });
 
         let mut next = Box::<Grid>::default();
         assert!(self.core.map(now, self.grid.as_deref(), &mut next));

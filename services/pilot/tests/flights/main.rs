@@ -5,6 +5,7 @@ mod alone;
 mod below;
 mod expiry;
 mod floor;
+mod hand;
 mod home;
 mod kept;
 mod rig;

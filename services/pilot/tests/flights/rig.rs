@@ -5,8 +5,9 @@
 use control::{Tilt, Vector, stick};
 use floorplan::{DistanceField, Plan};
 use ipc_types::{
-    COMMAND_LIFE_NS, Channels, Command, Ladder, LinkState, LocalizationState, Phase, PilotState, Pose,
-    Setpoint, SetpointKind, SonarHealth, SonarRanges, Verb,
+    Answer, ArmSwitch, COMMAND_LIFE_NS, Channels, Command, HEADING_HOLD, HEIGHT_HOLD, Ladder, LinkState,
+    LocalizationState, Phase, PilotState, Pose, Setpoint, SetpointKind, SonarHealth, SonarRanges, Sticks,
+    SticksState, Text, Verb,
 };
 use pilot::{Craft, PilotConfig, PilotCore};
 use std::collections::VecDeque;
@@ -123,14 +124,21 @@ pub(crate) struct Rig {
     pub(crate) setpoint: Option<Setpoint>,
     pub(crate) least_clearance: f32,
     pub(crate) steps: u64,
+    /// Who holds the sticks, if anybody does.
+    pub(crate) hand: Option<HandOn>,
     sequence: u32,
 }
 
 impl Rig {
     pub(crate) fn new(seed: u64) -> Self {
+        Self::with(seed, PilotConfig::default())
+    }
+
+    /// With another configuration, until a restart.
+    pub(crate) fn with(seed: u64, config: PilotConfig) -> Self {
         let plan = room();
         let walls = Arc::new(DistanceField::new(&plan, 2.0));
-        let core = PilotCore::new(PilotConfig::default(), craft(), Some((&plan, Arc::clone(&walls))));
+        let core = PilotCore::new(config, craft(), Some((&plan, Arc::clone(&walls))));
         let (x, y) = plan.origin();
         Self {
             plan,
@@ -185,6 +193,7 @@ impl Rig {
             setpoint: None,
             least_clearance: f32::INFINITY,
             steps: 0,
+            hand: None,
             sequence: 0,
         }
     }
@@ -222,6 +231,7 @@ impl Rig {
     /// 20 ms: sense, think, fly.
     pub(crate) fn step(&mut self) {
         self.sense();
+        self.send_sticks();
         self.core.step(self.now);
         if self.core.fills_channels() {
             self.core.write_channels(self.now, &mut self.channels);
@@ -356,5 +366,94 @@ impl Rig {
         self.core =
             PilotCore::new(PilotConfig::default(), craft(), Some((&self.plan, Arc::clone(&self.walls))));
         self.core.resume(self.now, &retained);
+    }
+}
+
+/// A human's hand: a new input each step, until it freezes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HandOn {
+    /// Forward, left, up, counter-clockwise.
+    pub(crate) axes: [f32; 4],
+    pub(crate) held: bool,
+    pub(crate) switches: u32,
+    pub(crate) arm: ArmSwitch,
+    /// The same input is sent again and again, as if it were new but for its number.
+    pub(crate) frozen: bool,
+    pub(crate) lease: u64,
+    pub(crate) sequence: u64,
+}
+
+impl Rig {
+    /// A guard with a connection asks for something.
+    pub(crate) fn guard(&mut self, verb: Verb, account: &str, socket: u64) -> bool {
+        self.sequence += 1;
+        let mut command = Command {
+            expiry_ns: self.now + COMMAND_LIFE_NS,
+            verb: verb.code().into(),
+            command_sequence: self.sequence,
+            account: Text::new(account),
+            certificate: Text::new("desk"),
+            socket,
+            ..Default::default()
+        };
+        command.header.stamp_ns = self.now;
+        self.core.command(self.now, &command);
+        self.core.write_state(&mut self.state);
+        self.state.answer == u32::from(Answer::Accepted.code())
+    }
+
+    /// Takes the sticks with all of them in the middle and the button held.
+    pub(crate) fn take(&mut self) {
+        assert!(self.guard(Verb::SticksTake, "ana", 7), "{}", self.state.answer_text);
+        self.hand = Some(HandOn {
+            axes: [0.0; 4],
+            held: true,
+            switches: HEIGHT_HOLD | HEADING_HOLD,
+            arm: ArmSwitch::Absent,
+            frozen: false,
+            lease: self.state.lease,
+            sequence: 0,
+        });
+    }
+
+    /// Takes the sticks in the air and waits until they are followed.
+    pub(crate) fn follow(&mut self) {
+        self.take();
+        for _ in 0..250 {
+            self.step();
+            if self.sticks_state() == SticksState::Following {
+                return;
+            }
+        }
+        panic!("not followed: {:?} {}", self.sticks_state(), self.core.sentence());
+    }
+
+    pub(crate) fn push(&mut self, axes: [f32; 4]) {
+        self.hand.as_mut().unwrap().axes = axes;
+    }
+
+    pub(crate) fn sticks_state(&self) -> SticksState {
+        SticksState::from_code(self.state.sticks).unwrap()
+    }
+
+    pub(crate) fn send_sticks(&mut self) {
+        let Some(hand) = &mut self.hand else { return };
+        hand.sequence += u64::from(!hand.frozen);
+        let [forward, left, up, turn] = hand.axes;
+        let mut message = Sticks {
+            input_sequence: hand.sequence,
+            lease: hand.lease,
+            age_ms: 5.0,
+            forward,
+            left,
+            up,
+            turn,
+            held: hand.held.into(),
+            switches: hand.switches,
+            arm: hand.arm.code().into(),
+            ..Default::default()
+        };
+        message.header.stamp_ns = self.now;
+        self.core.sticks(self.now, &message);
     }
 }
