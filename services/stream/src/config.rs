@@ -69,7 +69,11 @@ impl Validate for StreamConfig {
                 url.len() <= 256 && ["stun:", "turn:", "turns:"].iter().any(|scheme| url.starts_with(scheme))
             };
             if let Some(url) = server.urls.iter().find(|url| !known(url)) {
-                return Err(ConfigError::range("servers.urls", url, "stun:HOST:PORT, turn:HOST:PORT, turns:HOST:PORT"));
+                return Err(ConfigError::range(
+                    "servers.urls",
+                    url,
+                    "stun:HOST:PORT, turn:HOST:PORT, turns:HOST:PORT",
+                ));
             }
             let relays = server.urls.iter().any(|url| url.starts_with("turn"));
             if relays && (server.username.is_empty() || server.credential.is_empty()) {
@@ -102,7 +106,10 @@ mod tests {
             (StreamConfig { addresses: vec![], ..default.clone() }, "addresses"),
             (StreamConfig { viewers: 0, ..default.clone() }, "viewers"),
             (StreamConfig { servers: vec![server("http://x", "", "")], ..default.clone() }, "servers.urls"),
-            (StreamConfig { servers: vec![server("turn:x", "me", "")], ..default.clone() }, "servers.username"),
+            (
+                StreamConfig { servers: vec![server("turn:x", "me", "")], ..default.clone() },
+                "servers.username",
+            ),
             (StreamConfig { relay_only: true, ..default.clone() }, "relay_only"),
         ] {
             let error = config.validate().unwrap_err().to_string();

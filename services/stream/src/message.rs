@@ -150,7 +150,11 @@ impl FromViewer {
             format!("not a message that is known here: {what}")
         })?;
         let within = |field: &str, length: usize, most: usize| {
-            if length <= most { Ok(()) } else { Err(format!("{field} has {length} bytes: allowed is {most}")) }
+            if length <= most {
+                Ok(())
+            } else {
+                Err(format!("{field} has {length} bytes: allowed is {most}"))
+            }
         };
         match &message {
             Self::Call(call) if !call.format().is_valid() => Err(format!(
@@ -204,7 +208,8 @@ mod tests {
 
     #[test]
     fn messages_are_read_and_nonsense_gets_a_sentence() {
-        let call = FromViewer::parse(r#"{"call":{"width":640,"height":480,"fps":30,"mode":"pilot"}}"#).unwrap();
+        let call =
+            FromViewer::parse(r#"{"call":{"width":640,"height":480,"fps":30,"mode":"pilot"}}"#).unwrap();
         let FromViewer::Call(call) = call else { panic!("{call:?}") };
         assert_eq!((call.mode, call.format().bitrate), (Mode::Pilot, 1_013_760));
         let line = r#"{"candidate":{"candidate":"candidate:1 1 udp 1 127.0.0.1 9 typ host","sdpMid":"0","sdpMLineIndex":0}}"#;

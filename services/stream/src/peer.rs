@@ -113,8 +113,11 @@ impl Peer {
             .with_multicast_dns_mode(rtc::ice::mdns::MulticastDnsMode::Disabled)
             .with_include_loopback_candidate(true)
             .build();
-        let sockets: Vec<String> =
-            config.addresses.iter().map(|address| std::net::SocketAddr::new(*address, 0).to_string()).collect();
+        let sockets: Vec<String> = config
+            .addresses
+            .iter()
+            .map(|address| std::net::SocketAddr::new(*address, 0).to_string())
+            .collect();
         let connection = PeerConnectionBuilder::new()
             .with_configuration(
                 RTCConfigurationBuilder::new()
@@ -172,7 +175,8 @@ impl Peer {
         let answer = RTCSessionDescription::answer(sdp)?;
         self.connection.set_remote_description(answer).await?;
         let codecs = self.sender.get_parameters().await?.rtp_parameters.codecs;
-        let negotiated = codecs.iter().find(|codec| codec.rtp_codec.mime_type.eq_ignore_ascii_case(MIME_TYPE_H264));
+        let negotiated =
+            codecs.iter().find(|codec| codec.rtp_codec.mime_type.eq_ignore_ascii_case(MIME_TYPE_H264));
         self.payload_type = negotiated.map(|codec| codec.payload_type);
         if self.payload_type.is_none() {
             return Err(Error::Other("the browser has no decoder for H.264 constrained baseline".to_owned()));
@@ -270,9 +274,9 @@ fn path_in(report: &RTCStatsReport) -> Option<String> {
     let chosen = report.transport().map(|transport| transport.selected_candidate_pair_id.clone())?;
     let pair = report.candidate_pairs().find(|pair| pair.stats.id == chosen)?;
     let side = |id: &str| match report.get(id) {
-        Some(RTCStatsReportEntry::LocalCandidate(candidate) | RTCStatsReportEntry::RemoteCandidate(candidate)) => {
-            Some((candidate.candidate_type, candidate.protocol.to_lowercase()))
-        }
+        Some(
+            RTCStatsReportEntry::LocalCandidate(candidate) | RTCStatsReportEntry::RemoteCandidate(candidate),
+        ) => Some((candidate.candidate_type, candidate.protocol.to_lowercase())),
         _ => None,
     };
     let sides = [side(&pair.local_candidate_id), side(&pair.remote_candidate_id)];

@@ -92,7 +92,9 @@ impl Service for Stream {
         // What does not fit is cut off.
         let _ = match self.hub.viewers() {
             0 => write!(text, "nobody watches"),
-            count => write!(text, "{count} watch, {}x{} at {}/s", self.sent.width, self.sent.height, self.sent.fps),
+            count => {
+                write!(text, "{count} watch, {}x{} at {}/s", self.sent.width, self.sent.height, self.sent.fps)
+            }
         };
     }
 

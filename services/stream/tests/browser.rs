@@ -56,6 +56,9 @@ fn report(name: &str, watched: &Watched) {
         watched.numbers("gaps").into_iter().fold(0.0, f64::max),
         watched.0["trip"].as_f64().unwrap_or(f64::NAN) / 2.0,
         watched.0["inbound"],
-        watched.0["statuses"].as_array().and_then(|all| all.last()).map_or(&serde_json::Value::Null, |s| &s["path"]),
+        watched.0["statuses"]
+            .as_array()
+            .and_then(|all| all.last())
+            .map_or(&serde_json::Value::Null, |s| &s["path"]),
     );
 }

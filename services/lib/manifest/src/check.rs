@@ -119,7 +119,9 @@ impl Manifest {
                 } else if !is_said_by_people(topic) {
                     problem(
                         field,
-                        format!("{topic}: tools may publish only what people say (operator/*, camera/wish, signal/in)"),
+                        format!(
+                            "{topic}: tools may publish only what people say (operator/*, camera/wish, signal/in)"
+                        ),
                     );
                 }
             }

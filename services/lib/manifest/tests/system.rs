@@ -256,8 +256,7 @@ fn the_graph_shows_every_topic_and_reader() {
     }
     let edges = graph.lines().filter(|l| l.contains('|')).count();
     let drawn = |topic: &&String| !topic.starts_with("health/") && !topic.starts_with("trace/");
-    let readers: usize =
-        simulated.services.values().map(|s| s.subscribes.keys().filter(drawn).count()).sum();
+    let readers: usize = simulated.services.values().map(|s| s.subscribes.keys().filter(drawn).count()).sum();
     assert_eq!(edges, readers);
     let table = simulated.table();
     assert!(table.lines().any(|l| l.starts_with("pilot/state") && l.contains("pilot (kept)")), "{table}");

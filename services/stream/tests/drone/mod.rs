@@ -83,8 +83,11 @@ impl Watched {
         self.0[key].as_array().map(|all| all.iter().filter_map(Value::as_f64).collect()).unwrap_or_default()
     }
     pub fn errors(&self) -> Vec<String> {
-        self.numbers("errors").iter().map(f64::to_string).chain(
-            self.0["errors"].as_array().into_iter().flatten().map(ToString::to_string)).collect()
+        self.numbers("errors")
+            .iter()
+            .map(f64::to_string)
+            .chain(self.0["errors"].as_array().into_iter().flatten().map(ToString::to_string))
+            .collect()
     }
 }
 
@@ -121,7 +124,11 @@ impl Drone {
         let directory = tempfile::tempdir().unwrap();
         let deploy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy");
         for folder in ["plans", "vehicles", "worlds"] {
-            std::os::unix::fs::symlink(deploy.join(folder).canonicalize().unwrap(), directory.path().join(folder)).unwrap();
+            std::os::unix::fs::symlink(
+                deploy.join(folder).canonicalize().unwrap(),
+                directory.path().join(folder),
+            )
+            .unwrap();
         }
         std::fs::create_dir(directory.path().join("config")).unwrap();
         let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
@@ -177,8 +184,19 @@ impl Drone {
         let server = Server::start();
         let profile = tempfile::tempdir().unwrap();
         let mut browser = Command::new("chromium")
-            .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"])
-            .args(["--disable-background-networking", "--disable-component-update", "--autoplay-policy=no-user-gesture-required"])
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-quic",
+                "--no-first-run",
+                "--disable-sync",
+            ])
+            .args([
+                "--disable-background-networking",
+                "--disable-component-update",
+                "--autoplay-policy=no-user-gesture-required",
+            ])
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .arg(format!("http://{}/?{options}", server.address))
             .stdout(Stdio::null())
@@ -298,7 +316,12 @@ impl Server {
     }
 }
 
-fn serve(stream: TcpStream, say: &mpsc::Sender<String>, done: &mpsc::Sender<String>, outbox: &Mutex<VecDeque<String>>) {
+fn serve(
+    stream: TcpStream,
+    say: &mpsc::Sender<String>,
+    done: &mpsc::Sender<String>,
+    outbox: &Mutex<VecDeque<String>>,
+) {
     let _ = stream.set_nodelay(true);
     let mut writer = stream.try_clone().unwrap();
     let mut reader = BufReader::new(stream);
@@ -343,7 +366,8 @@ fn serve(stream: TcpStream, say: &mpsc::Sender<String>, done: &mpsc::Sender<Stri
             }
             _ => ("text/html", include_str!("../page.html").to_owned()),
         };
-        let head = format!("HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n\r\n", text.len());
+        let head =
+            format!("HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n\r\n", text.len());
         if writer.write_all((head + &text).as_bytes()).is_err() {
             return;
         }
