@@ -115,6 +115,7 @@ impl PilotCore {
             if there || self.phase_s(now) > CLIMB_S {
                 if self.by_hand.lease.holder().is_some() {
                     self.fly_by_hand(now);
+                    self.height_wish_m = self.config.height_m;
                 } else {
                     self.enter(now, self.after_take_off);
                 }
