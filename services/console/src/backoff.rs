@@ -155,7 +155,10 @@ mod tests {
             now += wait;
         }
         let s = 1000;
-        assert_eq!(waits, [0, 0, 0, 0, s, 2 * s, 4 * s, 8 * s, 16 * s, 32 * s, 60 * s, 60 * s, 60 * s, 60 * s]);
+        assert_eq!(
+            waits,
+            [0, 0, 0, 0, s, 2 * s, 4 * s, 8 * s, 16 * s, 32 * s, 60 * s, 60 * s, 60 * s, 60 * s]
+        );
         now += FORGET_MS;
         backoff.failed("ana", address(1), now);
         assert_eq!(backoff.ask("ana", address(1), now), Ok(()));

@@ -114,12 +114,9 @@ impl ConsoleConfig {
         })?;
         config.validate(path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
-        for file in [
-            &mut config.data,
-            &mut config.https.certificate,
-            &mut config.https.key,
-            &mut config.zenoh.client,
-        ] {
+        for file in
+            [&mut config.data, &mut config.https.certificate, &mut config.https.key, &mut config.zenoh.client]
+        {
             *file = folder.join(&*file);
         }
         Ok(config)
@@ -150,7 +147,11 @@ impl ConsoleConfig {
         }
         for endpoint in &self.zenoh.endpoints {
             if !endpoint.starts_with("tls/") || endpoint.parse::<zenoh::config::EndPoint>().is_err() {
-                return fail("zenoh.endpoints", format!("{endpoint:?}"), "tls/host:port, nothing without TLS");
+                return fail(
+                    "zenoh.endpoints",
+                    format!("{endpoint:?}"),
+                    "tls/host:port, nothing without TLS",
+                );
             }
         }
         Ok(())
@@ -168,7 +169,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("console.toml");
         std::fs::write(&path, text).unwrap();
-        ConsoleConfig::read(&path).map_err(|error| error.to_string().replace(&path.display().to_string(), "F"))
+        ConsoleConfig::read(&path)
+            .map_err(|error| error.to_string().replace(&path.display().to_string(), "F"))
     }
 
     #[test]
@@ -181,8 +183,16 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named() {
         for (from, to, says) in [
-            ("idle_min = 240", "idle_min = 0", "F: session.idle_min = 0 is out of range: allowed is 1..=1440"),
-            ("connections = 256", "connections = 1", "F: https.connections = 1 is out of range: allowed is 4..=4096"),
+            (
+                "idle_min = 240",
+                "idle_min = 0",
+                "F: session.idle_min = 0 is out of range: allowed is 1..=1440",
+            ),
+            (
+                "connections = 256",
+                "connections = 1",
+                "F: https.connections = 1 is out of range: allowed is 4..=4096",
+            ),
             ("# endpoints = [\"tls/", "endpoints = [\"tcp/", "nothing without TLS"),
             ("[session]", "[session]\nidel = 3", "idel"),
             ("127.0.0.1:8443", "here", "invalid socket address"),

@@ -62,10 +62,13 @@ impl Console {
         let store = Store::open(&config.data)?;
         let certificate = Arc::new(Certificate::read(&config.https.certificate, &config.https.key)?);
         let tls = TlsAcceptor::from(Arc::new(certificate.server()?));
-        let listener = server::listen(config.https.listen).map_err(|error| StartError::System(error.to_string()))?;
+        let listener =
+            server::listen(config.https.listen).map_err(|error| StartError::System(error.to_string()))?;
         let address = listener.local_addr().map_err(|error| StartError::System(error.to_string()))?;
         let redirect = match config.https.redirect {
-            Some(place) => Some(server::listen(place).map_err(|error| StartError::System(error.to_string()))?),
+            Some(place) => {
+                Some(server::listen(place).map_err(|error| StartError::System(error.to_string()))?)
+            }
             None => None,
         };
         let claim = offer(&store).await?;
@@ -73,7 +76,8 @@ impl Console {
             Directory::new(store.accounts().await?, store.sessions().await?, config.session.lifetime());
         let salt = random::<16>().map_err(|error| StartError::System(error.to_string()))?;
         let decoy = password::decoy(salt).map_err(|error| StartError::System(error.to_string()))?;
-        let fleet = Fleet::open(&config.zenoh, store.clone(), clock.clone(), &store.drones_seen().await?).await?;
+        let fleet =
+            Fleet::open(&config.zenoh, store.clone(), clock.clone(), &store.drones_seen().await?).await?;
         let app = Arc::new(App::new(store, fleet, page, clock, directory, decoy));
         let places = Places::new(config.https.connections, config.https.connections_an_address);
         let mut tasks = vec![
@@ -119,8 +123,7 @@ async fn look(certificate: Arc<Certificate>) {
 
 /// Draws a claim code and keeps its digest; `None` when the console has been claimed.
 async fn offer(store: &Store) -> Result<Option<String>, StartError> {
-    let random =
-        random::<CLAIM_CHARACTERS>().map_err(|error| StartError::System(error.to_string()))?;
+    let random = random::<CLAIM_CHARACTERS>().map_err(|error| StartError::System(error.to_string()))?;
     let code = claim_code(random);
     Ok(store.offer_claim(claim_digest(&code)).await?.then_some(code))
 }

@@ -3,8 +3,8 @@
 use crate::app::App;
 use crate::refusal::Refusal;
 use crate::role::is_drone_name;
-use crate::server::Held;
 use crate::secret::{Digest, digest_of};
+use crate::server::Held;
 use crate::table::{Least, Method, Names, ROUTES, Route};
 use crate::{Account, api, socket};
 use axum::Router;

@@ -75,7 +75,9 @@ fn run() -> Result<(), String> {
         config.data = data;
     }
     let page = match arguments.web {
-        Some(folder) if !folder.is_dir() => return Err(format!("--web {}: there is no such folder", folder.display())),
+        Some(folder) if !folder.is_dir() => {
+            return Err(format!("--web {}: there is no such folder", folder.display()));
+        }
         Some(folder) => Page::Folder(folder),
         None => Page::Embedded,
     };
@@ -100,7 +102,8 @@ async fn serve(config: &ConsoleConfig, page: Page) -> Result<(), String> {
     let mut hang_up = signal(SignalKind::hangup()).map_err(failed)?;
     let mut terminate = signal(SignalKind::terminate()).map_err(failed)?;
     let mut interrupt = signal(SignalKind::interrupt()).map_err(failed)?;
-    let console = Console::start(config, page, Arc::new(SystemClock)).await.map_err(|error| error.to_string())?;
+    let console =
+        Console::start(config, page, Arc::new(SystemClock)).await.map_err(|error| error.to_string())?;
     say(&format!("the watch room: https://{}/", console.address));
     if let Some(code) = &console.claim {
         say(&format!("nobody has claimed it yet; claim code: {code}"));

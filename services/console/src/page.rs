@@ -43,9 +43,10 @@ fn media_type(name: &str) -> &'static str {
 impl Page {
     fn find(&self, name: &str) -> Option<Cow<'static, [u8]>> {
         match self {
-            Self::Embedded => {
-                embedded::FILES.iter().find(|(known, _)| *known == name).map(|(_, bytes)| Cow::Borrowed(*bytes))
-            }
+            Self::Embedded => embedded::FILES
+                .iter()
+                .find(|(known, _)| *known == name)
+                .map(|(_, bytes)| Cow::Borrowed(*bytes)),
             Self::Folder(folder) => {
                 let plain = name.split('/').all(|part| !part.is_empty() && !part.starts_with('.'));
                 if !plain || name.contains('\\') {
@@ -104,7 +105,9 @@ mod tests {
         let page = Page::Folder(folder.path().join("web"));
         let headers = HeaderMap::new();
         assert!(page.answer("index.html", &headers).is_some());
-        for name in ["../secret", "app/../../secret", "/etc/passwd", ".git/config", "", "app//x", "..\\secret"] {
+        for name in
+            ["../secret", "app/../../secret", "/etc/passwd", ".git/config", "", "app//x", "..\\secret"]
+        {
             assert!(page.answer(name, &headers).is_none(), "{name}");
         }
     }

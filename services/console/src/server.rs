@@ -5,8 +5,8 @@ use axum::Router;
 use axum::body::Body;
 use axum::http::{HeaderValue, Request, Response, StatusCode, header};
 use hyper::body::Incoming;
-use hyper::service::Service;
 use hyper::server::conn::http1;
+use hyper::service::Service;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use std::collections::HashMap;
@@ -40,7 +40,8 @@ pub(crate) fn listen(address: SocketAddr) -> Result<TcpListener, std::io::Error>
         socket.bind(address)?;
         socket.listen(BACKLOG)
     };
-    open().map_err(|reason| std::io::Error::new(reason.kind(), format!("cannot listen on {address}: {reason}")))
+    open()
+        .map_err(|reason| std::io::Error::new(reason.kind(), format!("cannot listen on {address}: {reason}")))
 }
 
 /// How many connections there are, in all and from each address.

@@ -102,20 +102,16 @@ fn changed(path: &Path) -> Option<SystemTime> {
 }
 
 fn load(certificate: &Path, key: &Path) -> Result<Arc<CertifiedKey>, CertificateError> {
-    let wrong = |what, path: &Path, reason: String| CertificateError::File { what, path: path.to_owned(), reason };
+    let wrong =
+        |what, path: &Path, reason: String| CertificateError::File { what, path: path.to_owned(), reason };
     let chain: Vec<_> = CertificateDer::pem_file_iter(certificate)
         .and_then(Iterator::collect)
         .map_err(|error| wrong("certificate", certificate, error.to_string()))?;
     if chain.is_empty() {
         return Err(wrong("certificate", certificate, "there is no certificate in it".to_owned()));
     }
-    let private =
-        PrivateKeyDer::from_pem_file(key).map_err(|error| wrong("key", key, error.to_string()))?;
+    let private = PrivateKeyDer::from_pem_file(key).map_err(|error| wrong("key", key, error.to_string()))?;
     CertifiedKey::from_der(chain, private, &rustls::crypto::ring::default_provider()).map(Arc::new).map_err(
-        |reason| CertificateError::Pair {
-            certificate: certificate.to_owned(),
-            key: key.to_owned(),
-            reason,
-        },
+        |reason| CertificateError::Pair { certificate: certificate.to_owned(), key: key.to_owned(), reason },
     )
 }

@@ -99,7 +99,10 @@ async fn every_route_is_open_to_those_in_the_table_and_to_nobody_else() {
             } else {
                 assert_eq!(status, if person.is.is_none() { 401 } else { 403 });
             }
-            if allowed && route.action == Action::LogOut && let Some(email) = &person.email {
+            if allowed
+                && route.action == Action::LogOut
+                && let Some(email) = &person.email
+            {
                 person.client = bench.log_in(email).await;
             }
             tried += 1;
@@ -205,5 +208,9 @@ async fn every_message_is_open_to_those_in_the_table_and_to_nobody_else() {
     }
     let on_all = MESSAGES.len();
     let on_viewers = MESSAGES.iter().filter(|message| message.socket != Action::Sticks).count();
-    assert_eq!(opened, on_viewers + 3 * on_all, "viewer, guard, installer and administrator of this drone, nobody else");
+    assert_eq!(
+        opened,
+        on_viewers + 3 * on_all,
+        "viewer, guard, installer and administrator of this drone, nobody else"
+    );
 }

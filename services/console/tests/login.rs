@@ -70,7 +70,10 @@ async fn the_code_and_the_passwords_are_nowhere_in_the_files() {
 async fn a_session_is_a_cookie_that_ends_on_the_server() {
     let mut bench = Bench::new(0).await;
     let eva = bench.claim().await;
-    let reply = bench.client().post("/api/login", &json!({ "email": " EVA@example.org", "password": PASSWORD })).await;
+    let reply = bench
+        .client()
+        .post("/api/login", &json!({ "email": " EVA@example.org", "password": PASSWORD }))
+        .await;
     assert_eq!(reply.status, 200, "the case of an address does not matter");
     let cookie = reply.headers["set-cookie"].to_str().unwrap();
     for word in ["__Host-sereno=", "Secure", "HttpOnly", "SameSite=Strict", "Path=/"] {
@@ -96,9 +99,7 @@ async fn accounts_are_kept_by_administrators_and_one_remains() {
     let bench = Bench::new(0).await;
     let eva = bench.claim().await;
     let me = eva.get("/api/session").await.json()["account"]["id"].as_i64().unwrap();
-    let new = |email: &str, password: &str| {
-        json!({ "name": "Ana", "surname": "Prieto", "email": email, "password": password, "role": "guard" })
-    };
+    let new = |email: &str, password: &str| json!({ "name": "Ana", "surname": "Prieto", "email": email, "password": password, "role": "guard" });
     for (body, status, says) in [
         (new("EVA@Example.org", PASSWORD), 409, "another account"),
         (new("ana@example.org", "short"), 400, "12 to 256"),
@@ -124,7 +125,9 @@ async fn accounts_are_kept_by_administrators_and_one_remains() {
     assert_eq!(ana.get("/api/session").await.json()["account"]["language"], "en");
     // A new password ends the other sessions, not this one.
     let other = bench.log_in("ana@example.org").await;
-    let wrong = ana.post("/api/password", &json!({ "old": "not the old password", "new": "a new long password" })).await;
+    let wrong = ana
+        .post("/api/password", &json!({ "old": "not the old password", "new": "a new long password" }))
+        .await;
     assert_eq!(wrong.status, 403);
     let right = ana.post("/api/password", &json!({ "old": PASSWORD, "new": "a new long password" })).await;
     assert_eq!(right.status, 200, "{}", right.text);
@@ -188,7 +191,10 @@ async fn an_unknown_user_costs_the_time_of_a_wrong_password() {
     for k in 0..12 {
         for (at, email) in [(0, email.clone()), (1, format!("nobody{k}@example.org"))] {
             let began = std::time::Instant::now();
-            let reply = bench.client().post("/api/login", &json!({ "email": email, "password": "a wrong password" })).await;
+            let reply = bench
+                .client()
+                .post("/api/login", &json!({ "email": email, "password": "a wrong password" }))
+                .await;
             times[at].push(began.elapsed().as_secs_f64());
             assert_eq!(reply.status, 401);
             assert_eq!(reply.json()["error"], "e-mail address or password are wrong");
@@ -209,7 +215,9 @@ async fn the_log_is_only_added_to() {
     let eva = bench.claim().await;
     assert!(!bench.log(&eva).await.is_empty());
     let file = rusqlite::Connection::open(bench.folder.path().join("data/console.sqlite")).unwrap();
-    for attack in ["DELETE FROM log", "UPDATE log SET account = 'x'", "INSERT OR REPLACE INTO log SELECT * FROM log"] {
+    for attack in
+        ["DELETE FROM log", "UPDATE log SET account = 'x'", "INSERT OR REPLACE INTO log SELECT * FROM log"]
+    {
         let refused = file.execute(attack, []);
         assert!(refused.is_err() || attack.starts_with("INSERT"), "{attack}");
     }
@@ -230,7 +238,10 @@ async fn every_answer_guards_the_browser() {
         let reply = bench.client().get(path).await;
         let header = |name: &str| reply.headers[name].to_str().unwrap().to_owned();
         let policy = header("content-security-policy");
-        assert!(policy.contains("default-src 'self'") && policy.contains("frame-ancestors 'none'"), "{policy}");
+        assert!(
+            policy.contains("default-src 'self'") && policy.contains("frame-ancestors 'none'"),
+            "{policy}"
+        );
         assert!(!policy.contains("unsafe"));
         assert_eq!(header("x-content-type-options"), "nosniff");
         assert!(header("strict-transport-security").starts_with("max-age="));

@@ -29,7 +29,8 @@ async fn a_full_disk_and_a_folder_that_cannot_be_written_say_so_in_one_sentence(
     assert!(error.contains("console.sqlite"), "{error}");
     // No database at all.
     let damaged = tempfile::tempdir().unwrap();
-    std::fs::write(damaged.path().join("console.sqlite"), "this is no database, for sure ".repeat(100)).unwrap();
+    std::fs::write(damaged.path().join("console.sqlite"), "this is no database, for sure ".repeat(100))
+        .unwrap();
     let error = Store::open(damaged.path()).unwrap_err().to_string();
     assert!(error.contains("file is not a database"), "{error}");
     // One of a newer program.
@@ -66,12 +67,15 @@ async fn a_new_certificate_is_taken_and_nobody_is_logged_out() {
     moved.cookie.clone_from(&eva.cookie);
     common::until("the new certificate", async || {
         let moved = moved.clone();
-        tokio::spawn(async move { moved.get("/api/accounts").await.status }).await.is_ok_and(|status| status == 200)
+        tokio::spawn(async move { moved.get("/api/accounts").await.status })
+            .await
+            .is_ok_and(|status| status == 200)
     })
     .await;
     // A connection that was there before goes on.
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
-    let request = format!("GET /api/session HTTP/1.1\r\nhost: localhost\r\ncookie: {}\r\n\r\n", eva.cookie.unwrap());
+    let request =
+        format!("GET /api/session HTTP/1.1\r\nhost: localhost\r\ncookie: {}\r\n\r\n", eva.cookie.unwrap());
     kept.write_all(request.as_bytes()).await.unwrap();
     let mut start = [0; 12];
     kept.read_exact(&mut start).await.unwrap();
@@ -122,7 +126,10 @@ async fn the_program_says_where_it_is_and_how_to_claim_it() {
     assert_eq!(client.post("/api/claim", &body).await.status, 200);
     let refused = program().arg("--claim").output().unwrap();
     assert!(!refused.status.success());
-    assert_eq!(String::from_utf8_lossy(&refused.stderr), "sereno-console: this console has been claimed already\n");
+    assert_eq!(
+        String::from_utf8_lossy(&refused.stderr),
+        "sereno-console: this console has been claimed already\n"
+    );
     let signal = |name: &str| {
         assert!(Command::new("kill").arg(name).arg(child.id().to_string()).status().unwrap().success());
     };
@@ -141,7 +148,10 @@ async fn the_program_says_where_it_is_and_how_to_claim_it() {
         let failed = program().output().unwrap();
         let said = String::from_utf8_lossy(&failed.stderr).into_owned();
         assert!(!failed.status.success());
-        assert!(said.starts_with("sereno-console: ") && said.contains(says) && said.trim().lines().count() == 1, "{said}");
+        assert!(
+            said.starts_with("sereno-console: ") && said.contains(says) && said.trim().lines().count() == 1,
+            "{said}"
+        );
     }
 }
 
@@ -153,7 +163,10 @@ async fn the_second_port_only_redirects() {
     bench.config.https.redirect = Some(free);
     bench.restart().await;
     let mut stream = tokio::net::TcpStream::connect(free).await.unwrap();
-    stream.write_all(b"POST /api/login HTTP/1.1\r\nhost: drone.local\r\ncontent-length: 0\r\n\r\n").await.unwrap();
+    stream
+        .write_all(b"POST /api/login HTTP/1.1\r\nhost: drone.local\r\ncontent-length: 0\r\n\r\n")
+        .await
+        .unwrap();
     let mut text = String::new();
     stream.read_to_string(&mut text).await.unwrap();
     let port = bench.console().address.port();

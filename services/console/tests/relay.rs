@@ -60,12 +60,15 @@ async fn a_page_follows_a_drone_and_gives_an_order() {
     assert_eq!((order["x_m"].as_f64(), order["y_m"].as_f64()), (Some(4.0), Some(2.5)));
     assert!(order["socket"].as_u64().unwrap() > 0);
     assert_ne!(order["id"], orders[1].1["id"]);
-    let event = hear(&mut socket, |value| (value["event"]["verb"] == "land").then(|| value["event"].clone())).await;
+    let event =
+        hear(&mut socket, |value| (value["event"]["verb"] == "land").then(|| value["event"].clone())).await;
     assert_eq!((&event["account"], &event["accepted"]), (&json!("eva@example.org"), &json!(false)));
     until("orders are in the log with their answers", async || {
         let log = bench.log(&eva).await;
-        let said = |verb: &str| log.iter().find(|line| line["verb"] == verb).map(|line| line["answer"].clone());
-        said("goto") == Some(json!("accepted: goto: heard")) && said("land") == Some(json!("refused: land: heard"))
+        let said =
+            |verb: &str| log.iter().find(|line| line["verb"] == verb).map(|line| line["answer"].clone());
+        said("goto") == Some(json!("accepted: goto: heard"))
+            && said("land") == Some(json!("refused: land: heard"))
     })
     .await;
 }

@@ -27,7 +27,9 @@ async fn a_round_is_reported_with_rooms_failsafes_incidents_and_who_flew() {
     };
     // A change of phase is heard once the console is subscribed.
     let event = |kind: &'static str, text: &'static str| {
-        move |value: &serde_json::Value| (value["event"]["kind"] == kind && value["event"]["text"] == text).then_some(())
+        move |value: &serde_json::Value| {
+            (value["event"]["kind"] == kind && value["event"]["text"] == text).then_some(())
+        }
     };
     let mut every = tokio::time::interval(std::time::Duration::from_millis(50));
     {
@@ -43,7 +45,9 @@ async fn a_round_is_reported_with_rooms_failsafes_incidents_and_who_flew() {
             }
         }
     }
-    drone.say("localization/pose", &json!({ "x_m": 4.0, "y_m": 2.0, "heading_rad": 1.0, "searching": 0 })).await;
+    drone
+        .say("localization/pose", &json!({ "x_m": 4.0, "y_m": 2.0, "heading_rad": 1.0, "searching": 0 }))
+        .await;
     drone.say("pilot/state", &pilot(4, 6, "")).await;
     hear(&mut page, event("failsafe", "battery: return")).await;
     bench.pass(std::time::Duration::from_secs(20));
@@ -59,9 +63,14 @@ async fn a_round_is_reported_with_rooms_failsafes_incidents_and_who_flew() {
     assert_eq!((incident["x_m"].as_f64(), incident["y_m"].as_f64()), (Some(4.0), Some(2.0)));
     assert_eq!((&incident["account"], &incident["holder"]), (&json!(email), &json!("ana@example.org")));
     hear(&mut page, event("incident", "a window is open")).await;
-    assert_eq!(guard.post("/api/drones/north/incidents", &json!({ "text": "x".repeat(2001) })).await.status, 400);
+    assert_eq!(
+        guard.post("/api/drones/north/incidents", &json!({ "text": "x".repeat(2001) })).await.status,
+        400
+    );
     drone.say("navigation/patrol", &patrol(5, 2, 3)).await;
-    drone.say("localization/pose", &json!({ "x_m": 1.2, "y_m": 1.1, "heading_rad": 1.0, "searching": 0 })).await;
+    drone
+        .say("localization/pose", &json!({ "x_m": 1.2, "y_m": 1.1, "heading_rad": 1.0, "searching": 0 }))
+        .await;
     drone.say("pilot/state", &pilot(6, 0, "")).await;
     hear(&mut page, event("phase", "landing")).await;
     bench.pass(std::time::Duration::from_secs(10));
@@ -76,8 +85,14 @@ async fn a_round_is_reported_with_rooms_failsafes_incidents_and_who_flew() {
     assert_eq!(report["coverage"], 0.8);
     assert_eq!(report["landed_ms"].as_u64().unwrap() - report["started_ms"].as_u64().unwrap(), 30_000);
     assert_eq!(report["rooms"][0]["state"], "seen");
-    assert_eq!(report["rooms"][0]["left_ms"].as_u64().unwrap() - report["rooms"][0]["entered_ms"].as_u64().unwrap(), 20_000);
-    assert_eq!((&report["rooms"][1]["state"], &report["rooms"][1]["reason"]), (&json!("skipped"), &json!("door closed")));
+    assert_eq!(
+        report["rooms"][0]["left_ms"].as_u64().unwrap() - report["rooms"][0]["entered_ms"].as_u64().unwrap(),
+        20_000
+    );
+    assert_eq!(
+        (&report["rooms"][1]["state"], &report["rooms"][1]["reason"]),
+        (&json!("skipped"), &json!("door closed"))
+    );
     assert_eq!(report["failsafes"][0]["text"], "battery: return");
     assert_eq!(report["flown_by"][0]["text"], "ana@example.org");
     assert_eq!(report["incidents"][0]["text"], "a window is open");

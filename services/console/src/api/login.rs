@@ -26,8 +26,7 @@ pub(super) fn session(asked: &Asked) -> Response<Body> {
 
 fn state(app: &App, account: Option<&Account>) -> serde_json::Value {
     let drones = account.map(|account| app.fleet.names_for(account)).unwrap_or_default();
-    let message =
-        account.filter(|account| account.drones.is_empty()).map(|_| "no drone assigned");
+    let message = account.filter(|account| account.drones.is_empty()).map(|_| "no drone assigned");
     serde_json::json!({
         "claimed": app.directory().is_claimed(),
         "account": account.map(|account| serde_json::json!({
@@ -149,10 +148,7 @@ pub(super) async fn log_out(asked: Asked) -> Result<Response<Body>, Refusal> {
     app.store.forget_sessions(vec![*session]).await?;
     app.store.log(app.entry(Kind::LogOut, account, asked.address)).await?;
     let mut response = json(StatusCode::OK, &state(app, None));
-    set_cookie(
-        &mut response,
-        &format!("{COOKIE}=; Path=/; Secure; HttpOnly; SameSite=Strict; Max-Age=0"),
-    );
+    set_cookie(&mut response, &format!("{COOKIE}=; Path=/; Secure; HttpOnly; SameSite=Strict; Max-Age=0"));
     Ok(response)
 }
 

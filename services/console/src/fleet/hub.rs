@@ -1,8 +1,8 @@
 //! Who looks at which topic of one drone. A topic is subscribed while somebody looks; all viewers share one message.
 
 use crate::mailbox::Mailbox;
-use axum::extract::ws::{Message, Utf8Bytes};
 use axum::body::Bytes;
+use axum::extract::ws::{Message, Utf8Bytes};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Weak};
 use zenoh::pubsub::Subscriber;

@@ -44,7 +44,10 @@ pub(super) async fn open(config: &ZenohConfig) -> Result<Link, LinkError> {
         ("listen/endpoints", json!([])),
         ("connect/timeout_ms", json!(-1)),
         ("connect/exit_on_failure", json!(false)),
-        ("connect/retry", json!({ "period_init_ms": 250, "period_max_ms": 2000, "period_increase_factor": 2 })),
+        (
+            "connect/retry",
+            json!({ "period_init_ms": 250, "period_max_ms": 2000, "period_increase_factor": 2 }),
+        ),
         ("scouting/multicast/enabled", json!(false)),
         ("scouting/gossip/enabled", json!(false)),
         ("transport/link/tls/enable_mtls", json!(true)),

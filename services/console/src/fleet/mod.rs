@@ -73,10 +73,8 @@ impl Fleet {
         }
         // Unbounded: only who has a certificate comes and goes, and losing one would lose a drone.
         let (tokens, mut come) = tokio::sync::mpsc::unbounded_channel::<(String, bool)>();
-        let failed = |error: zenoh::Error| LinkError::Open {
-            path: config.client.clone(),
-            reason: error.to_string(),
-        };
+        let failed =
+            |error: zenoh::Error| LinkError::Open { path: config.client.clone(), reason: error.to_string() };
         fleet
             .session
             .liveliness()
@@ -260,7 +258,9 @@ impl Fleet {
         let mut memory = drone.memory();
         let news = match topic {
             "pilot/state" => serde_json::from_slice(&bytes).map(|view| memory.follower.pilot(&view, now_ms)),
-            "navigation/patrol" => serde_json::from_slice(&bytes).map(|view| memory.follower.patrol(&view, now_ms)),
+            "navigation/patrol" => {
+                serde_json::from_slice(&bytes).map(|view| memory.follower.patrol(&view, now_ms))
+            }
             _ => serde_json::from_slice(&bytes).map(|view| {
                 memory.follower.pose(view);
                 Vec::new()
@@ -333,7 +333,9 @@ impl Fleet {
             && let Ok(value) = serde_json::from_slice::<serde_json::Value>(&bytes)
         {
             let mut memory = drone.memory();
-            let plan_of = |about: &str| serde_json::from_str::<serde_json::Value>(about).ok().map(|v| v["plan"].clone());
+            let plan_of = |about: &str| {
+                serde_json::from_str::<serde_json::Value>(about).ok().map(|v| v["plan"].clone())
+            };
             if memory.about.as_deref().and_then(plan_of) != Some(value["plan"].clone()) {
                 memory.plan_is_old = true;
             }

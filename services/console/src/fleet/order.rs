@@ -96,7 +96,9 @@ impl Fleet {
             x_m: place.0,
             y_m: place.1,
         };
-        let Ok(payload) = serde_json::to_vec(&payload) else { return Answer::refused("the order cannot be written") };
+        let Ok(payload) = serde_json::to_vec(&payload) else {
+            return Answer::refused("the order cannot be written");
+        };
         let key = format!("sereno/{}/command/{verb}/{}", drone.name, self.certificate);
         let replies = self
             .session

@@ -16,7 +16,12 @@ pub(crate) struct Signal {
 
 impl Fleet {
     /// Begins to listen to what the drone says in this session.
-    pub(crate) async fn signal(&self, drone: &Arc<Drone>, session: &str, page: &Box) -> Result<Signal, String> {
+    pub(crate) async fn signal(
+        &self,
+        drone: &Arc<Drone>,
+        session: &str,
+        page: &Box,
+    ) -> Result<Signal, String> {
         let key = format!("sereno/{}/signal/{}/{session}", drone.name, self.certificate);
         let to = Arc::downgrade(page);
         let out = self

@@ -104,7 +104,10 @@ impl Follower {
                 end_last(&mut round.report.flown_by, now_ms);
                 if !view.holder.is_empty() {
                     let text = view.holder.clone();
-                    push(&mut round.report.flown_by, Span { time_ms: now_ms, ended_ms: None, text, action: "" });
+                    push(
+                        &mut round.report.flown_by,
+                        Span { time_ms: now_ms, ended_ms: None, text, action: "" },
+                    );
                 }
             }
         }
@@ -155,9 +158,9 @@ impl Follower {
         } else if round.flew {
             round.landed_ms = Some(now_ms);
             if !matches!(before, Some(Phase::EmergencyLanding | Phase::Cut)) {
-                let near = place.zip(round.pad).is_some_and(|(place, (x_m, y_m))| {
-                    (place.x_m - x_m).hypot(place.y_m - y_m) <= ON_PAD_M
-                });
+                let near = place
+                    .zip(round.pad)
+                    .is_some_and(|(place, (x_m, y_m))| (place.x_m - x_m).hypot(place.y_m - y_m) <= ON_PAD_M);
                 round.report.outcome = if near { "landed_on_pad" } else { "landed_elsewhere" };
             }
         }
@@ -206,7 +209,8 @@ impl Follower {
             let text = self.holder.clone();
             report.flown_by.push(Span { time_ms: now_ms, ended_ms: None, text, action: "" });
         }
-        self.round = Some(Round { report, flew: airborne, landed_ms: None, silent_since_ms: None, pad: None });
+        self.round =
+            Some(Round { report, flew: airborne, landed_ms: None, silent_since_ms: None, pad: None });
     }
 
     fn finish(&mut self, now_ms: u64) -> Option<News> {
@@ -231,7 +235,11 @@ impl Follower {
                 push(&mut round.report.silences, Span { time_ms: now_ms, ended_ms: None, text, action: "" });
             }
         }
-        vec![News::Event(Event::new(now_ms, "link", if alive { "connection found" } else { "connection lost" }))]
+        vec![News::Event(Event::new(
+            now_ms,
+            "link",
+            if alive { "connection found" } else { "connection lost" },
+        ))]
     }
 
     /// Time passes.

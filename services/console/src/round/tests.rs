@@ -15,7 +15,12 @@ fn patrol(state: PatrolState, room: RoomState) -> PatrolView {
         pad_x_m: Some(1.0),
         pad_y_m: Some(1.0),
         coverage: Some(0.5),
-        rooms: vec![RoomView { name: "Hall".to_owned(), reason: String::new(), seen: Some(0.5), state: room.code() }],
+        rooms: vec![RoomView {
+            name: "Hall".to_owned(),
+            reason: String::new(),
+            seen: Some(0.5),
+            state: room.code(),
+        }],
         text: "flying".to_owned(),
     }
 }
@@ -95,15 +100,20 @@ fn a_touch_of_the_ground_on_the_way_up_is_no_landing() {
 #[test]
 fn failsafes_have_a_beginning_and_an_end() {
     let (mut follower, now) = flown(Phase::Autonomous, 1.0);
-    for (at, cause) in [(10, FailsafeCause::PoseUncertain), (20, FailsafeCause::Lost), (30, FailsafeCause::None)] {
+    for (at, cause) in
+        [(10, FailsafeCause::PoseUncertain), (20, FailsafeCause::Lost), (30, FailsafeCause::None)]
+    {
         let news = follower.pilot(&pilot(Phase::Autonomous, cause), now + at);
-        assert!(matches!(&news[..], [News::Event(event)] if event.kind == "failsafe" && event.text == cause.word()));
+        assert!(
+            matches!(&news[..], [News::Event(event)] if event.kind == "failsafe" && event.text == cause.word())
+        );
         assert!(follower.pilot(&pilot(Phase::Autonomous, cause), now + at + 1).is_empty(), "said once");
     }
     follower.pilot(&pilot(Phase::Landing, FailsafeCause::None), now + 40);
     follower.pilot(&pilot(Phase::Grounded, FailsafeCause::None), now + 50);
     let spans = report(follower.tick(now + MINUTE)).map(|report| report.failsafes).unwrap_or_default();
-    let spans: Vec<_> = spans.iter().map(|span| (span.text.as_str(), span.time_ms - now, span.ended_ms)).collect();
+    let spans: Vec<_> =
+        spans.iter().map(|span| (span.text.as_str(), span.time_ms - now, span.ended_ms)).collect();
     assert_eq!(spans, [("position uncertain", 10, Some(now + 20)), ("lost", 20, Some(now + 30))]);
 }
 

@@ -229,7 +229,11 @@ impl Reader {
 }
 
 /// Writes what waits for the page until `end` says why it is over.
-async fn write(page: Box, mut sink: SplitSink<WebSocket, Message>, end: tokio::sync::oneshot::Receiver<Option<End>>) {
+async fn write(
+    page: Box,
+    mut sink: SplitSink<WebSocket, Message>,
+    end: tokio::sync::oneshot::Receiver<Option<End>>,
+) {
     let mut ping = tokio::time::interval_at(Instant::now() + PING, PING);
     tokio::pin!(end);
     let reason = loop {
@@ -258,7 +262,13 @@ trait Listener: Send {
 }
 
 /// Runs both halves until one ends.
-async fn both(open: Arc<Open>, socket: WebSocket, least: Role, per_second: f64, listener: &mut impl Listener) {
+async fn both(
+    open: Arc<Open>,
+    socket: WebSocket,
+    least: Role,
+    per_second: f64,
+    listener: &mut impl Listener,
+) {
     let (sink, stream) = socket.split();
     let mut reader = Reader::new(&open, stream, least, per_second);
     let (end, ended) = tokio::sync::oneshot::channel();

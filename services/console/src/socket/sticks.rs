@@ -150,7 +150,7 @@ mod tests {
             ("true", "1", "invalid type"),
         ] {
             let error = Frame::read(&GOOD.replacen(from, to, 1)).unwrap_err();
-            assert!(error.contains(says) || says == "lease" , "{error}");
+            assert!(error.contains(says) || says == "lease", "{error}");
         }
         assert!(Frame::read(&format!("{}{GOOD}", " ".repeat(FRAME_BYTES))).is_err());
     }

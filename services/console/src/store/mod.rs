@@ -141,8 +141,6 @@ fn open(path: &Path) -> Result<Connection, StoreError> {
     connection.pragma_update(None, "foreign_keys", true).map_err(failed)?;
     schema::migrate(&mut connection, path)?;
     // Whether it can be written is known now, not at the first log-in.
-    connection
-        .execute("INSERT INTO starts (time_ms) VALUES (unixepoch() * 1000)", [])
-        .map_err(failed)?;
+    connection.execute("INSERT INTO starts (time_ms) VALUES (unixepoch() * 1000)", []).map_err(failed)?;
     Ok(connection)
 }

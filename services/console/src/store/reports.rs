@@ -189,7 +189,10 @@ impl Store {
     /// SQLite's.
     pub async fn drones_seen(&self) -> Result<Vec<String>, StoreError> {
         self.run(|connection| {
-            connection.prepare("SELECT name FROM drones ORDER BY name")?.query_map([], |row| row.get(0))?.collect()
+            connection
+                .prepare("SELECT name FROM drones ORDER BY name")?
+                .query_map([], |row| row.get(0))?
+                .collect()
         })
         .await
     }

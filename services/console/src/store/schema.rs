@@ -85,8 +85,7 @@ pub(super) fn migrate(connection: &mut Connection, path: &Path) -> Result<(), St
     // Immediate: a second process that opens the same new file waits.
     let transaction =
         connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate).map_err(failed)?;
-    let found: i64 =
-        transaction.query_row("PRAGMA user_version", [], |row| row.get(0)).map_err(failed)?;
+    let found: i64 = transaction.query_row("PRAGMA user_version", [], |row| row.get(0)).map_err(failed)?;
     let known = STEPS.len() as i64;
     if !(0..=known).contains(&found) {
         return Err(StoreError::Newer { path: path.to_owned(), found, known });

@@ -74,7 +74,10 @@ impl Drone {
         session
             .declare_queryable(format!("sereno/{name}/about"))
             .callback(move |query| {
-                zenoh::Wait::wait(query.reply(query.key_expr(), about.to_string()).encoding("application/json")).unwrap();
+                zenoh::Wait::wait(
+                    query.reply(query.key_expr(), about.to_string()).encoding("application/json"),
+                )
+                .unwrap();
             })
             .background()
             .await
@@ -100,7 +103,10 @@ impl Drone {
                         *now += 50_000_000;
                         *now
                     };
-                    let _ = session.put(&key, format!("{{\"beacon_ns\":{ns}}}")).encoding("application/json").await;
+                    let _ = session
+                        .put(&key, format!("{{\"beacon_ns\":{ns}}}"))
+                        .encoding("application/json")
+                        .await;
                 }
             })
         };

@@ -51,7 +51,8 @@ impl Bench {
         let authority = Authority::new(folder.path());
         let endpoints: Vec<String> = (0..drones).map(|_| drone::endpoint()).collect();
         let client = folder.path().join("console.json5");
-        std::fs::write(&client, format!("// of a test\n{}", authority.zenoh("console", &[], &endpoints))).unwrap();
+        std::fs::write(&client, format!("// of a test\n{}", authority.zenoh("console", &[], &endpoints)))
+            .unwrap();
         let https = authority.identity("https");
         let config = ConsoleConfig {
             data: folder.path().join("data"),
@@ -106,7 +107,12 @@ impl Bench {
     }
 
     /// Makes an account and logs it in.
-    pub async fn account(&self, administrator: &Client, role: Role, drones: &[&str]) -> (Client, i64, String) {
+    pub async fn account(
+        &self,
+        administrator: &Client,
+        role: Role,
+        drones: &[&str],
+    ) -> (Client, i64, String) {
         static NUMBER: AtomicU64 = AtomicU64::new(0);
         let email = format!("{}{}@example.org", role.word(), NUMBER.fetch_add(1, Ordering::SeqCst));
         let new = json!({ "name": "Ana", "surname": "Prieto", "email": email, "password": PASSWORD,

@@ -1,7 +1,7 @@
 // Orders on a socket and their answers, matched by number.
 
-/** Nobody who waits longer for an answer still wants the order (an order itself lives two seconds). */
-const PATIENCE_MS = 5000;
+/** An order is answered at once as a rule, after ten seconds at most, when a route is worked out. */
+const PATIENCE_MS = 12_000;
 
 export class Orders {
   constructor(send) {

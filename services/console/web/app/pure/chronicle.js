@@ -3,19 +3,26 @@
 import { ACTIONS, CAUSES, PATROL, PHASES, ROOMS, STICKS, word } from "./codes.js";
 
 const MOST = 300;
+/** The pilot's words for its phases, where they are not those of the word lists. */
+const PHASE_WORD = { "take-off": "takeoff", "emergency landing": "emergency" };
 const PHASE_TONE = { emergency: "alarm", cut: "alarm", manual: "lamp" };
 
 export class Chronicle {
-  constructor() {
+  /** `began` is when this page began to look on: what changed since then it sees by itself. */
+  constructor(began = 0) {
     this.entries = [];
     this.count = 0;
     this.before = null;
     /** Number of the newest report that was written while this page looked on; null before any. */
     this.report = null;
+    this.began = began;
+    this.told_before = new Set();
   }
+  /** Newest first, also when the console tells of what was before. */
   add(at, kind, tone, key, values = {}) {
     this.count += 1;
-    this.entries.unshift({ number: this.count, at, kind, tone, key, values });
+    const place = this.entries.findIndex((entry) => entry.at <= at);
+    this.entries.splice(place < 0 ? this.entries.length : place, 0, { number: this.count, at, kind, tone, key, values });
     if (this.entries.length > MOST) this.entries.length = MOST;
   }
   /** Compares with what was there at the last look; the first look tells nothing but how things stand. */
@@ -55,9 +62,20 @@ export class Chronicle {
   ordered(verb, { outcome }, at) {
     if (outcome === "unsent" || outcome === "unanswered") this.add(at, "order", "caution", `event.order_${outcome}`, { verb: { key: `verb.${verb}` } });
   }
-  /** A line of the console, {time_ms, kind, text, account?, verb?, accepted?, report?}. Phases and failsafes are seen here already. */
+  /** A line of the console, {time_ms, kind, text, account?, verb?, accepted?, report?}. A page that comes, or comes again, is told the last hundred. */
   told(line, at) {
-    if (line === null || typeof line !== "object" || line.kind === "phase" || line.kind === "failsafe") return;
+    if (line === null || typeof line !== "object") return;
+    const same = [line.time_ms, line.kind, line.text, line.verb, line.account].join("|");
+    if (Number.isFinite(line.time_ms)) {
+      if (this.told_before.has(same)) return;
+      this.told_before.add(same);
+      if (this.told_before.size > 2 * MOST) this.told_before.delete(this.told_before.values().next().value);
+    }
+    const old = Number.isFinite(line.time_ms) && line.time_ms < this.began;
+    if (line.kind === "phase" || line.kind === "failsafe") {
+      if (old) this.toldState(line);
+      return;
+    }
     const when = Number.isFinite(line.time_ms) ? line.time_ms : at;
     const values = { who: line.account ?? "", text: { sentence: String(line.text ?? "") } };
     if (line.kind === "order") {
@@ -65,8 +83,19 @@ export class Chronicle {
       this.add(when, "order", line.accepted ? "lamp" : "caution", key, { ...values, verb: { key: `verb.${line.verb}` } });
     } else if (line.kind === "incident") this.add(when, "incident", "caution", "event.incident", values);
     else if (Number.isFinite(line.report)) {
-      this.report = line.report;
+      if (!old) this.report = line.report;
       this.add(when, "report", "ok", "event.report", { ...values, report: line.report });
-    } else this.add(when, "told", line.kind === "link" ? "caution" : "info", "event.told", values);
+    } else if (line.kind === "round" && line.text === "started") this.add(when, "round", "lamp", "event.round_started");
+    else this.add(when, "told", line.kind === "link" ? "caution" : "info", "event.told", values);
+  }
+  /** A phase or a failsafe from before this page was opened. */
+  toldState({ time_ms, kind, text, verb }) {
+    if (kind === "failsafe") {
+      if (text === "none") this.add(time_ms, "failsafe", "ok", "event.failsafe_over");
+      else this.add(time_ms, "failsafe", "alarm", "event.failsafe", { cause: { sentence: text }, action: { sentence: verb ?? "" } });
+      return;
+    }
+    const phase = PHASE_WORD[text] ?? text;
+    if (PHASES.includes(phase)) this.add(time_ms, "phase", PHASE_TONE[phase] ?? "info", `phase.${phase}`);
   }
 }

@@ -42,7 +42,7 @@ export class WatchSession extends EventTarget {
     this.aboutError = null;
     this.trail = new Trail();
     this.alarms = new Alarms();
-    this.chronicle = new Chronicle();
+    this.chronicle = new Chronicle(Date.now());
     this.current = new MeanCurrent();
     this.sonars = new Map();
     this.places = [];

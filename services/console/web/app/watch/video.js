@@ -49,7 +49,8 @@ export class VideoPanel {
       h("div", { class: "video-stage" }, this.video, this.cover, this.age),
       h("div", { class: "video-bar" }, h("div", { class: "segments", role: "group", "aria-label": t("video.mode") }, this.modes), this.choice, this.path, full));
     this.frameAt = null;
-    this.delay = null;
+    this.delay = 0;
+    this.sentAge = 0;
     this.state = "calling";
     this.socket = new Socket(socketUrl("signal", session.drone), {
       open: () => this.call(),
@@ -89,16 +90,16 @@ export class VideoPanel {
       if (message?.offer) await this.offered(message.offer);
       else if (message?.candidate) await this.candidate(message.candidate);
       else if (message?.status) this.told(message.status);
-      else if (message?.hang_up) this.drop("hung_up", message.hang_up.reason);
-      else if (message?.error) this.drop("error", message.error.text);
+      else if (message?.hang_up) this.hungUp(message.hang_up.reason ?? "");
+      else if (message?.error) this.complaint(message.error.text ?? String(message.error));
     } catch {
       this.drop("error");
     }
   }
-  async offered({ sdp, ice_servers }) {
+  async offered({ sdp, servers }) {
     clearTimeout(this.timer);
     this.close();
-    const peer = new RTCPeerConnection({ iceServers: Array.isArray(ice_servers) ? ice_servers : [] });
+    const peer = new RTCPeerConnection({ iceServers: Array.isArray(servers) ? servers : [] });
     this.peer = peer;
     this.early = [];
     this.set("connecting");
@@ -131,22 +132,36 @@ export class VideoPanel {
     if (this.peer.remoteDescription) await this.peer.addIceCandidate(candidate);
     else if (this.early.length < 64) this.early.push(candidate);
   }
+  /** Ended by the drone, for a reason that may have gone: it is called again after a while. */
+  hungUp(reason) {
+    this.drop("hung_up", reason);
+    this.timer = setTimeout(() => this.call(), AGAIN_MS);
+  }
+  /** Something was refused; the session goes on. */
+  complaint(text) {
+    if (this.state === "live") setText(this.path, sentence(text));
+    else this.set("error", text);
+  }
   tuneBuffer() {
     for (const receiver of this.peer?.getReceivers() ?? []) {
       if ("jitterBufferTarget" in receiver) receiver.jitterBufferTarget = this.mode === "watch" ? WATCH_BUFFER_MS : null;
     }
   }
   told(status) {
+    this.sentAge = Number.isFinite(status.age_ms) ? status.age_ms : 0;
+    const way = ["udp", "tcp", "turn"].includes(status.path) ? t(`video.path.${status.path}`) : "";
     const size = Number.isFinite(status.height) ? `${status.height}p` : "";
     const others = status.chosen_by && status.chosen_by !== this.session.account.email ? t("video.chosen_by", { who: status.chosen_by }) : "";
-    setText(this.path, [size, Number.isFinite(status.fps) ? `${number(status.fps)} fps` : "", status.path ? t(`video.path.${status.path}`) : "", others].filter(Boolean).join(" · "));
+    setText(this.path, [size, Number.isFinite(status.fps) ? `${number(status.fps)} fps` : "", way, others].filter(Boolean).join(" · "));
   }
   /** Counts the frames as they are shown, with the time at which each was caught where the drone tells it. */
   frames() {
     const next = (now, frame) => {
       this.frameAt = performance.now();
-      const from = frame.captureTime ?? frame.receiveTime ?? null;
-      this.delay = from === null ? null : Math.max(0, frame.expectedDisplayTime - from);
+      // From the camera's clock where it comes along; else from its arrival, and what the drone says of its age when it left.
+      const since = (from) => Math.max(0, frame.expectedDisplayTime - from);
+      if (frame.captureTime !== undefined) this.delay = since(frame.captureTime);
+      else this.delay = (frame.receiveTime === undefined ? 0 : since(frame.receiveTime)) + this.sentAge;
       if (this.state !== "live") this.set("live");
       if (!this.ended) this.video.requestVideoFrameCallback(next);
     };
@@ -167,7 +182,7 @@ export class VideoPanel {
     const live = this.state === "live" && this.frameAt !== null;
     show(this.age, live);
     if (!live) return;
-    const age = now - this.frameAt + (this.delay ?? 0);
+    const age = now - this.frameAt + this.delay;
     const frozen = now - this.frameAt > FROZEN_MS;
     setData(this.element, "frozen", frozen);
     setText(this.age, frozen ? t("video.frozen", { age: ageWords(age) }) : t("video.age", { age: ageWords(age) }));

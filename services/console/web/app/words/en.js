@@ -322,7 +322,7 @@ export default {
   "room.unknown": "–",
 
   "events.name": "Events",
-  "events.none": "Nothing has happened since you opened this page.",
+  "events.none": "Nothing has happened yet.",
 
   "event.failsafe": "{cause}: {action}",
   "event.failsafe_over": "The failsafe is over",
@@ -341,6 +341,7 @@ export default {
   "events.report": "Open it",
 
   "event.incident": "Incident ({who}): {text}",
+  "event.round_started": "A round has started",
   "event.report": "The report of the round is ready.",
   "event.told": "{text}",
 
@@ -399,7 +400,7 @@ export default {
   "video.chosen_by": "size chosen by {who}",
   "video.path.udp": "direct",
   "video.path.tcp": "over TCP",
-  "video.path.relay": "over a relay",
+  "video.path.turn": "over a relay",
   "video.state.calling": "Calling the camera…",
   "video.state.connecting": "Connecting the video…",
   "video.state.live": "Live",

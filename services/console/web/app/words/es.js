@@ -322,7 +322,7 @@ export default {
   "room.unknown": "–",
 
   "events.name": "Sucesos",
-  "events.none": "No ha pasado nada desde que abrió esta página.",
+  "events.none": "Aún no ha pasado nada.",
 
   "event.failsafe": "{cause}: {action}",
   "event.failsafe_over": "La protección ha terminado",
@@ -341,6 +341,7 @@ export default {
   "events.report": "Abrirlo",
 
   "event.incident": "Incidencia ({who}): {text}",
+  "event.round_started": "Ha empezado una ronda",
   "event.report": "El informe de la ronda está listo.",
   "event.told": "{text}",
 
@@ -399,7 +400,7 @@ export default {
   "video.chosen_by": "tamaño elegido por {who}",
   "video.path.udp": "directo",
   "video.path.tcp": "por TCP",
-  "video.path.relay": "por repetidor",
+  "video.path.turn": "por repetidor",
   "video.state.calling": "Llamando a la cámara…",
   "video.state.connecting": "Conectando el vídeo…",
   "video.state.live": "En directo",

@@ -106,6 +106,9 @@ export default [
   ["pilot {what}", "piloto: {what}"],
   // The console and the bridge.
   ["accepted: {text}", "aceptado: {text}"],
+  ["connection found", "conexión recuperada"],
+  ["connection lost", "conexión perdida"],
+  ["the page is gone", "la página se ha cerrado"],
   ["add", "añadir"],
   ["change", "modificar"],
   ["claim", "dar de alta"],
