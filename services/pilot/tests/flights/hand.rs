@@ -76,7 +76,8 @@ fn the_button_let_go_is_a_hover() {
     rig.follow();
     rig.push([0.0, -1.0, 0.0, 0.0]);
     rig.run(1.5);
-    assert!(rig.velocity.norm() > 0.25);
+    let right = control::wrap_angle(rig.velocity.angle() - rig.heading + 1.571);
+    assert!(rig.velocity.norm() > 0.25 && right.abs() < 0.25, "{right}");
     rig.hand.as_mut().unwrap().held = false;
     rig.run(1.5);
     assert_eq!((rig.phase(), rig.sticks_state()), (Phase::Manual, SticksState::Ready));
