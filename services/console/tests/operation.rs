@@ -11,10 +11,9 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// A database in a folder whose file system has no room left: a file of fixed size would do, but needs a mount; SQLite's own
-/// limit of pages gives the same error, SQLITE_FULL, by the same path.
+/// Tests run as root, who may write where others may not: what nobody can write stands in for a read-only folder.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_full_disk_and_a_folder_that_cannot_be_written_say_so_in_one_sentence() {
+async fn a_folder_or_file_that_cannot_be_used_is_named_in_one_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     std::fs::write(&file, "x").unwrap();
@@ -22,7 +21,7 @@ async fn a_full_disk_and_a_folder_that_cannot_be_written_say_so_in_one_sentence(
     assert!(error.starts_with(&format!("the console's data folder {}", file.display())), "{error}");
     let error = Store::open(Path::new("/proc/no-such-place")).unwrap_err().to_string();
     assert!(error.contains("/proc/no-such-place") && !error.contains('\n'), "{error}");
-    // Root may write where nobody may: a database that is read-only to everybody is one on a folder in its place.
+    // A folder where the file belongs.
     let taken = tempfile::tempdir().unwrap();
     std::fs::create_dir(taken.path().join("console.sqlite")).unwrap();
     let error = Store::open(taken.path()).unwrap_err().to_string();
@@ -98,12 +97,10 @@ async fn a_new_certificate_is_taken_and_nobody_is_logged_out() {
 async fn the_program_says_where_it_is_and_how_to_claim_it() {
     let bench = Bench::new(0).await;
     let config = bench.folder.path().join("console.toml");
-    let text = format!(
-        "data = \"program-data\"\n[https]\nlisten = \"127.0.0.1:0\"\ncertificate = \"https.pem\"\nkey = \"https.key\"\n\
+    let text = "data = \"program-data\"\n[https]\nlisten = \"127.0.0.1:0\"\ncertificate = \"https.pem\"\nkey = \"https.key\"\n\
          connections = 64\nconnections_an_address = 64\n[zenoh]\nclient = \"console.json5\"\n\
-         [session]\nidle_min = 60\nabsolute_h = 12\n"
-    );
-    std::fs::write(&config, &text).unwrap();
+         [session]\nidle_min = 60\nabsolute_h = 12\n";
+    std::fs::write(&config, text).unwrap();
     let program = || {
         let mut program = Command::new(env!("CARGO_BIN_EXE_sereno-console"));
         program.arg("--config").arg(&config);
