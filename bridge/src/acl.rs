@@ -26,7 +26,8 @@ impl Rules {
     /// Gives a certificate the rules of these names.
     fn bind(&mut self, certificate: &str, rules: &[String]) {
         let id = format!("certificate {certificate}");
-        self.subjects.push(json!({ "id": id, "cert_common_names": [certificate], "link_protocols": ["tls"] }));
+        self.subjects
+            .push(json!({ "id": id, "cert_common_names": [certificate], "link_protocols": ["tls"] }));
         self.policies.push(json!({ "subjects": [id], "rules": rules }));
     }
 
@@ -120,7 +121,8 @@ pub fn of_router(clients: &Clients) -> Value {
             continue;
         }
         let everything = format!("sereno/{name}/**");
-        let (told, wanted, carried) = (format!("told {name}"), format!("wanted {name}"), format!("carried {name}"));
+        let (told, wanted, carried) =
+            (format!("told {name}"), format!("wanted {name}"), format!("carried {name}"));
         rules.allow(
             &told,
             IN,

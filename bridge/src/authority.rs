@@ -162,7 +162,12 @@ impl Authority {
             self.page(hosts, now_s)?;
         }
         if !self.client_config("console").is_file() {
-            self.client("console", Standing::from_word("administrator").ok_or_else(unreachable)?, endpoints, now_s)?;
+            self.client(
+                "console",
+                Standing::from_word("administrator").ok_or_else(unreachable)?,
+                endpoints,
+                now_s,
+            )?;
         }
         Ok(())
     }
@@ -170,9 +175,11 @@ impl Authority {
     fn make_authority(&self, owner: &str, now_s: i64) -> Result<()> {
         let key = KeyPair::generate().map_err(failed("no key for the authority"))?;
         // Browsers and trust stores list authorities by name: two of them must not look alike.
-        let mark: String = key.public_key_raw().iter().rev().take(4).map(|byte| format!("{byte:02x}")).collect();
+        let mark: String =
+            key.public_key_raw().iter().rev().take(4).map(|byte| format!("{byte:02x}")).collect();
         let mut params = authority_params(&format!("Sereno {owner} {mark}"));
-        (params.not_before, params.not_after) = (time(now_s, CLOCKS, false), time(now_s, AUTHORITY_LIFE, true));
+        (params.not_before, params.not_after) =
+            (time(now_s, CLOCKS, false), time(now_s, AUTHORITY_LIFE, true));
         let certificate = params.self_signed(&key).map_err(failed("no certificate for the authority"))?;
         write_private(&self.path("ca.key"), key.serialize_pem().as_bytes())?;
         write_public(&self.path("ca.pem"), certificate.pem().as_bytes())?;
@@ -182,9 +189,8 @@ impl Authority {
     fn issuer(&self) -> Result<Issuer<'static, KeyPair>> {
         let (certificate, key) = (self.path("ca.pem"), self.path("ca.key"));
         let pem = read_text(&certificate)?;
-        let key_pem = read_text(&key).map_err(|error| {
-            format!("{error} (certificates are made where the authority's key is)")
-        })?;
+        let key_pem = read_text(&key)
+            .map_err(|error| format!("{error} (certificates are made where the authority's key is)"))?;
         let key_pair = KeyPair::from_pem(&key_pem)
             .map_err(|error| CertificateError(format!("{}: no private key: {error}", key.display())))?;
         check_key(&key.display().to_string(), &key_pem, &pem)?;
@@ -244,7 +250,13 @@ impl Authority {
     ///
     /// # Errors
     /// As [`Authority::init`]; also when no endpoint is given or one is not TLS.
-    pub fn client(&self, name: &str, standing: Standing, endpoints: &[String], now_s: i64) -> Result<PathBuf> {
+    pub fn client(
+        &self,
+        name: &str,
+        standing: Standing,
+        endpoints: &[String],
+        now_s: i64,
+    ) -> Result<PathBuf> {
         check_name(name)?;
         let mut clients = self.clients()?;
         if clients.standing(name) == Some(Standing::Drone) {
@@ -262,8 +274,13 @@ impl Authority {
             return Err(CertificateError("an endpoint is needed, as tls/192.168.4.20:7447".into()));
         }
         let server = standing == Standing::Router;
-        let hosts = if server { with_local(&endpoints.iter().filter_map(|e| host_of(e)).collect::<Vec<_>>()) } else { Vec::new() };
-        let (certificate, key) = self.leaf(name, &hosts, if server { Use::Server } else { Use::Client }, now_s)?;
+        let hosts = if server {
+            with_local(&endpoints.iter().filter_map(|e| host_of(e)).collect::<Vec<_>>())
+        } else {
+            Vec::new()
+        };
+        let (certificate, key) =
+            self.leaf(name, &hosts, if server { Use::Server } else { Use::Client }, now_s)?;
         let authority = read_text(&self.path("ca.pem"))?;
         let drones: Vec<String> = self
             .clients()?
@@ -319,7 +336,9 @@ impl Authority {
         let mut files = pem_files(&self.directory)?;
         if let Ok(entries) = std::fs::read_dir(self.path("clients")) {
             for place in entries.flatten().map(|entry| entry.path()).filter(|path| path.is_dir()) {
-                files.extend(pem_files(&place)?.into_iter().filter(|file| file.file_name() != Some("ca.pem".as_ref())));
+                files.extend(
+                    pem_files(&place)?.into_iter().filter(|file| file.file_name() != Some("ca.pem".as_ref())),
+                );
             }
         }
         files.sort();
@@ -356,8 +375,12 @@ impl Authority {
                 "untrusted" => continue,
                 _ => {
                     let config = read_text(&self.client_config(&old.name))?;
-                    let endpoints = crate::zenoh_config::endpoints_of(&config)
-                        .ok_or_else(|| CertificateError(format!("{}: no endpoints in it", self.client_config(&old.name).display())))?;
+                    let endpoints = crate::zenoh_config::endpoints_of(&config).ok_or_else(|| {
+                        CertificateError(format!(
+                            "{}: no endpoints in it",
+                            self.client_config(&old.name).display()
+                        ))
+                    })?;
                     let Some(standing) = clients.standing(&old.name) else { continue };
                     self.write_client(&old.name, standing, &endpoints, now_s)?;
                 }

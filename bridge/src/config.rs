@@ -69,7 +69,10 @@ fn endpoints(field: &'static str, endpoints: &[String]) -> Result<(), ConfigErro
     }
     for endpoint in endpoints {
         let address = endpoint.strip_prefix("tls/").unwrap_or("");
-        let port = address.rsplit_once(':').filter(|(host, _)| !host.is_empty()).map(|(_, port)| port.parse::<u16>());
+        let port = address
+            .rsplit_once(':')
+            .filter(|(host, _)| !host.is_empty())
+            .map(|(_, port)| port.parse::<u16>());
         let plain = address.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-._:[]".contains(&byte));
         if !(plain && matches!(port, Some(Ok(_)))) {
             return Err(ConfigError::range(field, endpoint, "tls/HOST:PORT, as tls/127.0.0.1:7447"));
@@ -133,7 +136,10 @@ mod tests {
     #[test]
     fn what_is_not_tls_or_out_of_range_is_refused_by_name() {
         for (text, said) in [
-            ("listen = [\"tcp/127.0.0.1:7447\"]", "bridge.toml: listen = tcp/127.0.0.1:7447 is out of range: allowed is tls/"),
+            (
+                "listen = [\"tcp/127.0.0.1:7447\"]",
+                "bridge.toml: listen = tcp/127.0.0.1:7447 is out of range: allowed is tls/",
+            ),
             ("listen = [\"tls/127.0.0.1\"]", "listen"),
             ("listen = [\"tls/127.0.0.1:99999\"]", "listen"),
             ("connect = [\"tls/hub:7447#enable_mtls=false\"]", "connect"),

@@ -75,5 +75,8 @@ pub(crate) fn check_private(path: &Path) -> Result<(), String> {
     if mode & 0o077 == 0 {
         return Ok(());
     }
-    Err(format!("{}: mode {mode:o}: a private key must be readable by its owner alone (chmod 600)", path.display()))
+    Err(format!(
+        "{}: mode {mode:o}: a private key must be readable by its owner alone (chmod 600)",
+        path.display()
+    ))
 }

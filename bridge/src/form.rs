@@ -155,8 +155,23 @@ fn write_patrol(patrol: &Patrol, out: &mut String) -> std::fmt::Result {
     }
     out.push('{');
     plain!(
-        header, started_ns, command_ns, waypoints_used, next, rooms_used, state, pad_x_m, pad_y_m, coverage, plan,
-        seen_origin_x_m, seen_origin_y_m, seen_cell_m, command_sequence, waited_s, answer
+        header,
+        started_ns,
+        command_ns,
+        waypoints_used,
+        next,
+        rooms_used,
+        state,
+        pad_x_m,
+        pad_y_m,
+        coverage,
+        plan,
+        seen_origin_x_m,
+        seen_origin_y_m,
+        seen_cell_m,
+        command_sequence,
+        waited_s,
+        answer
     );
     write_list("waypoints", patrol.waypoints.get(..patrol.waypoints_used as usize).unwrap_or(&[]), out)?;
     write_list("rooms", patrol.rooms.get(..patrol.rooms_used as usize).unwrap_or(&[]), out)?;

@@ -124,7 +124,13 @@ impl Gate {
     ///
     /// # Errors
     /// One sentence for whoever gave it.
-    pub fn decide(&mut self, now: u64, certificate: &str, verb: Verb, json: &[u8]) -> Result<Command, String> {
+    pub fn decide(
+        &mut self,
+        now: u64,
+        certificate: &str,
+        verb: Verb,
+        json: &[u8],
+    ) -> Result<Command, String> {
         let order = Order::parse(verb, json)?;
         let Some(role) = self.role(certificate, order.role) else {
             return Err(format!("the certificate {certificate} is not on the drone's list of clients"));
@@ -133,7 +139,9 @@ impl Gate {
             return Err(format!("a {} may not order: guard, installer or administrator may", role.word()));
         }
         if order.beacon_ns > now || order.beacon_ns < self.first_beacon_ns {
-            return Err("beacon_ns is no beacon of this drone since it started: give the order again".to_owned());
+            return Err(
+                "beacon_ns is no beacon of this drone since it started: give the order again".to_owned()
+            );
         }
         let age_ns = now - order.beacon_ns;
         if age_ns > BEACON_LIFE_NS {
@@ -200,7 +208,11 @@ mod tests {
                     let more = format!("{place},\"role\":\"{}\"", account.word());
                     let decided = gate().decide(START, certificate.word(), verb, &order(1, START, &more));
                     let may = certificate.min(account) >= Role::Guard;
-                    assert_eq!(decided.is_ok(), may, "{verb} by {certificate:?} for {account:?}: {decided:?}");
+                    assert_eq!(
+                        decided.is_ok(),
+                        may,
+                        "{verb} by {certificate:?} for {account:?}: {decided:?}"
+                    );
                     if let Ok(command) = decided {
                         assert_eq!(command.role.as_str(), certificate.min(account).word());
                         assert_eq!(command.certificate.as_str(), certificate.word());

@@ -42,7 +42,11 @@ pub fn read(directory: &Path, drone: &str, now_s: i64) -> Result<Papers, String>
     check_time(&name(&authority_file), &above, now_s)?;
     check_time(&name(&own_file), &own, now_s)?;
     if own.name != drone {
-        return Err(format!("{}: common name = {}: must be {drone}", name(&own_file), manifest::plain(&own.name)));
+        return Err(format!(
+            "{}: common name = {}: must be {drone}",
+            name(&own_file),
+            manifest::plain(&own.name)
+        ));
     }
     crate::x509::check_signed(&name(&own_file), &certificate, &authority)?;
     crate::x509::check_key(&name(&key_file), &key, &certificate)?;

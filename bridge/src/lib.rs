@@ -10,6 +10,7 @@ pub mod about;
 pub mod acl;
 pub mod authority;
 pub mod config;
+mod ear;
 mod files;
 pub mod form;
 pub mod gate;

@@ -3,12 +3,11 @@
 
 use crate::about::About;
 use crate::config::BridgeConfig;
-use crate::gate::{Class, Limits};
-use crate::keys::{Keys, part, verb_from_word};
-use crate::pending::refusal;
+use crate::ear::Ear;
+use crate::gate::Limits;
+use crate::keys::Keys;
 use crate::roles::Clients;
 use crate::sessions::{Hearing, Keeper};
-use crate::zenoh_config::{MAX_ORDER, MAX_SIGNAL};
 use ipc_types::Verb;
 use runtime::{StartError, Waker};
 use std::path::PathBuf;
@@ -20,7 +19,6 @@ use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
-use zenoh::sample::Sample;
 
 /// Orders that wait for the next step. The limits of each certificate are kept before this queue.
 const ORDERS: usize = 64;
@@ -35,8 +33,8 @@ const ANSWERS: usize = 256;
 
 /// Who asked, to be answered once, and by which key: a question with wildcards is answered by the drone's own.
 pub struct Asker {
-    query: Query,
-    key: String,
+    pub(crate) query: Query,
+    pub(crate) key: String,
 }
 
 /// Something that came in and passed the limits of its certificate.
@@ -99,10 +97,10 @@ pub(crate) struct Put {
     pub pace: Pace,
 }
 
-struct Answer {
-    asker: Asker,
+pub(crate) struct Answer {
+    pub asker: Asker,
     /// `None` ends the question without an answer.
-    payload: Option<(Encoding, Vec<u8>)>,
+    pub payload: Option<(Encoding, Vec<u8>)>,
 }
 
 /// What was lost on the way, since the start.
@@ -112,21 +110,6 @@ pub struct Losses {
     pub refused: AtomicU64,
     /// Messages and answers that found their queue full on the way out.
     pub unsent: AtomicU64,
-}
-
-/// What callbacks of all sessions share.
-struct Ear {
-    keys: Keys,
-    about: Arc<About>,
-    clients: Arc<Mutex<Arc<Clients>>>,
-    limits: Mutex<Limits>,
-    orders: SyncSender<Heard>,
-    urgent: SyncSender<Heard>,
-    others: SyncSender<Heard>,
-    sticks: SyncSender<HeardSticks>,
-    answers: SyncSender<Answer>,
-    losses: Arc<Losses>,
-    waker: Waker,
 }
 
 /// The drone on the network, or on its way there.
@@ -268,133 +251,4 @@ fn reply(answer: Answer) {
         // Who asked may have gone.
         let _ = query.reply(key, payload).encoding(encoding).express(true).wait();
     }
-}
-
-impl Ear {
-    fn lose(&self) {
-        self.losses.refused.fetch_add(1, Ordering::Relaxed);
-    }
-
-    fn may(&self, certificate: &str, class: Class) -> bool {
-        let now = runtime::monotonic_ns();
-        self.limits.lock().unwrap_or_else(PoisonError::into_inner).take(now, certificate, class)
-    }
-
-    fn knows(&self, certificate: &str) -> bool {
-        let clients = Arc::clone(&self.clients.lock().unwrap_or_else(PoisonError::into_inner));
-        clients.role(certificate).is_some()
-    }
-
-    fn say(&self, asker: Asker, payload: Option<(Encoding, Vec<u8>)>) {
-        if self.answers.try_send(Answer { asker, payload }).is_err() {
-            self.lose();
-        }
-    }
-
-    fn refuse(&self, asker: Asker, sentence: &str) {
-        self.lose();
-        self.say(asker, Some((Encoding::APPLICATION_JSON, refusal(sentence).to_string().into_bytes())));
-    }
-
-    fn hand_over(&self, queue: &SyncSender<Heard>, heard: Heard) {
-        match queue.try_send(heard) {
-            Ok(()) => self.waker.wake(),
-            Err(error) => {
-                let (std::sync::mpsc::TrySendError::Full(heard)
-                | std::sync::mpsc::TrySendError::Disconnected(heard)) = error;
-                match heard {
-                    Heard::Order { asker, .. } => self.refuse(asker, "too many orders at once"),
-                    _ => self.lose(),
-                }
-            }
-        }
-    }
-}
-
-impl Hearing for Ear {
-    fn keys(&self) -> &Keys {
-        &self.keys
-    }
-
-    fn known(&self, clients: Clients) {
-        *self.clients.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(clients);
-    }
-
-    fn order(&self, query: Query) {
-        let key = query.key_expr().as_str().to_owned();
-        let asker = Asker { query, key: key.clone() };
-        let (Some(word), Some(certificate)) = (part(&key, 3), part(&key, 4)) else {
-            return self.refuse(asker, "this key is no order: sereno/DRONE/command/VERB/CERTIFICATE is");
-        };
-        let Some(verb) = verb_from_word(word) else {
-            let words: Vec<String> = Verb::ALL.iter().map(|verb| crate::keys::verb_word(*verb)).collect();
-            let word = manifest::plain(&word.chars().take(40).collect::<String>());
-            return self.refuse(asker, &format!("{word} is no order: there are {}", words.join(", ")));
-        };
-        if !self.knows(certificate) {
-            return self.refuse(asker, "this certificate is not on the drone's list of clients");
-        }
-        if !self.may(certificate, Class::of(verb)) {
-            return self.refuse(asker, "too many orders: not so fast");
-        }
-        let json = asker.query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default();
-        if json.len() > MAX_ORDER {
-            return self.refuse(asker, &format!("an order of {} bytes: allowed are at most {MAX_ORDER}", json.len()));
-        }
-        let queue = if Class::of(verb) == Class::Urgent { &self.urgent } else { &self.orders };
-        self.hand_over(queue, Heard::Order { certificate: certificate.to_owned(), verb, json, asker });
-    }
-
-    fn sticks(&self, sample: &Sample) {
-        let Some(certificate) = part(sample.key_expr().as_str(), 3) else { return self.lose() };
-        let fits = sample.payload().len() <= MAX_ORDER;
-        if !(fits && self.knows(certificate) && self.may(certificate, Class::Sticks)) {
-            return self.lose();
-        }
-        let heard = HeardSticks {
-            certificate: certificate.to_owned(),
-            json: sample.payload().to_bytes().into_owned(),
-        };
-        match self.sticks.try_send(heard) {
-            Ok(()) => self.waker.wake(),
-            Err(_) => self.lose(),
-        }
-    }
-
-    fn signal(&self, sample: &Sample) {
-        let key = sample.key_expr().as_str();
-        let (Some(certificate), Some(session)) = (part(key, 3), part(key, 4)) else { return self.lose() };
-        let fits = sample.payload().len() <= MAX_SIGNAL && session.len() <= crate::roles::MAX_NAME;
-        if !(fits && self.knows(certificate) && self.may(certificate, Class::Other)) {
-            return self.lose();
-        }
-        let json = sample.payload().to_bytes().into_owned();
-        let heard = Heard::Signal { certificate: certificate.to_owned(), session: session.to_owned(), json };
-        self.hand_over(&self.others, heard);
-    }
-
-    fn newest(&self, query: Query) {
-        let prefix = self.keys.telemetry("");
-        let key = query.key_expr().as_str().to_owned();
-        let topic = key.strip_prefix(&prefix).map(str::to_owned);
-        let asker = Asker { query, key };
-        // A question that names no single topic is answered by nobody.
-        match topic.filter(|topic| !topic.contains('*')) {
-            Some(topic) if self.may("", Class::Other) => {
-                self.hand_over(&self.others, Heard::Newest { topic, asker });
-            }
-            _ => self.lose(),
-        }
-    }
-
-    fn about(&self, query: Query) {
-        let json = self.about.json.clone().into_bytes();
-        self.say(Asker { query, key: self.keys.about() }, Some((Encoding::APPLICATION_JSON, json)));
-    }
-
-    fn plan(&self, query: Query) {
-        let asker = Asker { query, key: self.keys.plan() };
-        self.say(asker, Some((Encoding::IMAGE_PNG, self.about.plan.clone())));
-    }
-
 }

@@ -82,7 +82,10 @@ impl Order {
             })?),
         };
         if text.account.len() > LONGEST_ACCOUNT || text.account.chars().any(char::is_control) {
-            return Err(format!("account = {}: at most {LONGEST_ACCOUNT} bytes of text", shown(&text.account)));
+            return Err(format!(
+                "account = {}: at most {LONGEST_ACCOUNT} bytes of text",
+                shown(&text.account)
+            ));
         }
         let (x_m, y_m) = match (verb, text.x_m, text.y_m) {
             (Verb::GoTo, Some(x), Some(y)) if x.abs() <= FAR_M && y.abs() <= FAR_M => (x, y),
@@ -199,9 +202,14 @@ pub fn parse_sticks(json: &[u8], now: u64, first_beacon_ns: u64) -> Result<Input
 
 fn read<'a, T: Deserialize<'a>>(what: &str, json: &'a [u8]) -> Result<T, String> {
     if json.len() > crate::zenoh_config::MAX_ORDER {
-        return Err(format!("{} bytes are no {what}: allowed are at most {}", json.len(), crate::zenoh_config::MAX_ORDER));
+        return Err(format!(
+            "{} bytes are no {what}: allowed are at most {}",
+            json.len(),
+            crate::zenoh_config::MAX_ORDER
+        ));
     }
-    serde_json::from_slice(json).map_err(|error| format!("not the JSON of {what}: {}", shortened(&error.to_string())))
+    serde_json::from_slice(json)
+        .map_err(|error| format!("not the JSON of {what}: {}", shortened(&error.to_string())))
 }
 
 /// What somebody said, as an answer may quote it.

@@ -213,11 +213,19 @@ mod tests {
         let mut pending = Pending::default();
         let mut given = Vec::new();
         for (name, verb) in [("a", Verb::TakeOff), ("b", Verb::Land), ("c", Verb::Hold), ("d", Verb::Stop)] {
-            pending.add(verb, command(), name).unwrap();
+            let command = Command { verb: u32::from(verb.code()), ..command() };
+            pending.add(verb, command, name).unwrap();
         }
         for step in 0..8 {
             let now = START + step * 20 * MS;
-            assert!(pending.give(now, |order| { given.push((step, order.verb)); true }).is_none());
+            assert!(
+                pending
+                    .give(now, |order| {
+                        given.push((step, order.verb));
+                        true
+                    })
+                    .is_none()
+            );
         }
         let code = |verb: Verb| u32::from(verb.code());
         let expected = [(0, Verb::Stop), (3, Verb::TakeOff), (6, Verb::Land)];
@@ -230,7 +238,10 @@ mod tests {
         let mut numbers = Vec::new();
         for asker in 0..5 {
             pending.add(Verb::Stop, command(), asker).unwrap();
-            pending.give(START, |order| { numbers.push(order.command_sequence); true });
+            pending.give(START, |order| {
+                numbers.push(order.command_sequence);
+                true
+            });
         }
         numbers.dedup();
         assert_eq!(numbers.len(), 5);
@@ -241,13 +252,22 @@ mod tests {
         let mut pending = Pending::default();
         pending.add(Verb::TakeOff, command(), "desk").unwrap();
         let mut number = 0;
-        pending.give(START, |order| { number = order.command_sequence; true });
+        pending.give(START, |order| {
+            number = order.command_sequence;
+            true
+        });
         assert!(pending.answered(START + 100 * MS).is_none());
         pending.hear_pilot(&state(number, Answer::Accepted));
         let (asker, said) = pending.answered(START + 100 * MS).unwrap();
-        assert_eq!((asker, &said["accepted"], &said["text"]), ("desk", &json!(true), &json!("pilot says so")));
+        assert_eq!(
+            (asker, &said["accepted"], &said["text"]),
+            ("desk", &json!(true), &json!("pilot says so"))
+        );
         pending.add(Verb::Land, command(), "desk").unwrap();
-        pending.give(START + 200 * MS, |order| { number = order.command_sequence; true });
+        pending.give(START + 200 * MS, |order| {
+            number = order.command_sequence;
+            true
+        });
         pending.hear_pilot(&state(number, Answer::Accepted));
         assert!(pending.answered(START + 3200 * MS).is_none());
         let (_, said) = pending.answered(START + 3201 * MS).unwrap();
@@ -272,7 +292,10 @@ mod tests {
         let take = Command { socket: 17, certificate: Text::new("desk"), ..command() };
         pending.add(Verb::SticksTake, take, ()).unwrap();
         let mut number = 0;
-        pending.give(START, |order| { number = order.command_sequence; true });
+        pending.give(START, |order| {
+            number = order.command_sequence;
+            true
+        });
         let granted = PilotState { lease: 3, holder_socket: 17, ..state(number, Answer::Accepted) };
         pending.hear_pilot(&PilotState { holder_socket: 18, ..granted });
         assert_eq!(pending.holder(), None, "somebody else got it");

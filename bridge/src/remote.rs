@@ -50,11 +50,16 @@ impl Remote {
         let text = crate::files::read_text(file)?;
         let name = file.display();
         let config = Config::from_json5(&text).map_err(|error| format!("{name}: {}", said(error)))?;
-        let metadata: Value =
-            config.get_json("metadata").ok().and_then(|json| serde_json::from_str(&json).ok()).unwrap_or_default();
+        let metadata: Value = config
+            .get_json("metadata")
+            .ok()
+            .and_then(|json| serde_json::from_str(&json).ok())
+            .unwrap_or_default();
         let certificate = metadata["certificate"]
             .as_str()
-            .ok_or_else(|| format!("{name}: metadata.certificate is missing: `sereno certs client` writes it"))?
+            .ok_or_else(|| {
+                format!("{name}: metadata.certificate is missing: `sereno certs client` writes it")
+            })?
             .to_owned();
         let session = zenoh::open(config).wait().map_err(|error| {
             format!("cannot connect as {certificate}: {} (is the drone on, and does its certificate name this address?)", said(error))
@@ -68,13 +73,20 @@ impl Remote {
             (None, [], [drone]) => (*drone).to_owned(),
             (None, [], _) => return Err("no drone is there".to_owned()),
             (None, several, _) => {
-                return Err(format!("there are several drones, choose one with --drone: {}", several.join(", ")));
+                return Err(format!(
+                    "there are several drones, choose one with --drone: {}",
+                    several.join(", ")
+                ));
             }
         };
         if !alive.contains(&drone) {
             return Err(format!(
                 "{drone} is not there, or does not know the certificate {certificate}: {}",
-                if alive.is_empty() { "no drone answers".to_owned() } else { format!("there are {}", alive.join(", ")) }
+                if alive.is_empty() {
+                    "no drone answers".to_owned()
+                } else {
+                    format!("there are {}", alive.join(", "))
+                }
             ));
         }
         Ok(Self { keys: Keys::of(&drone), session, drone, certificate })
@@ -92,7 +104,8 @@ impl Remote {
     /// When it does not answer.
     pub fn about(&self) -> Result<Value, String> {
         let bytes = self.ask(&self.keys.about(), None, PATIENCE)?;
-        serde_json::from_slice(&bytes).map_err(|error| format!("{} says no JSON of itself: {error}", self.drone))
+        serde_json::from_slice(&bytes)
+            .map_err(|error| format!("{} says no JSON of itself: {error}", self.drone))
     }
 
     /// The first answer to a question.

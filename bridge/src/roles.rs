@@ -111,9 +111,8 @@ impl Clients {
     /// # Errors
     /// One sentence with file, field, value and what is allowed.
     pub fn parse(file: &str, text: &str) -> Result<Self, String> {
-        let raw: Raw = toml::from_str(text).map_err(|error| {
-            format!("{file}: {}", manifest::one_line(error.to_string().trim_end()))
-        })?;
+        let raw: Raw = toml::from_str(text)
+            .map_err(|error| format!("{file}: {}", manifest::one_line(error.to_string().trim_end())))?;
         if raw.client.len() > MAX_CLIENTS {
             return Err(format!("{file}: {} clients: allowed are at most {MAX_CLIENTS}", raw.client.len()));
         }
@@ -190,7 +189,8 @@ mod tests {
     #[test]
     fn a_list_is_read_as_it_was_written() {
         let mut clients = Clients::default();
-        for (name, word) in [("desk", "guard"), ("hub.1", "router"), ("py", "viewer"), ("sereno-1", "drone")] {
+        for (name, word) in [("desk", "guard"), ("hub.1", "router"), ("py", "viewer"), ("sereno-1", "drone")]
+        {
             clients.set(name, Standing::from_word(word).unwrap());
         }
         assert_eq!(Clients::parse("clients.toml", &clients.to_toml()).unwrap(), clients);
@@ -201,7 +201,10 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named() {
         for (text, said) in [
-            ("[client.desk]\nrole = \"king\"", "clients.toml: client.desk.role = \"king\": allowed are viewer,"),
+            (
+                "[client.desk]\nrole = \"king\"",
+                "clients.toml: client.desk.role = \"king\": allowed are viewer,",
+            ),
             ("[client.desk]\nrule = \"guard\"", "rule"),
             ("[client.\"a/b\"]\nrole = \"guard\"", "client.\"a/b\": a name has"),
             ("[client.\"*\"]\nrole = \"guard\"", "a name has"),

@@ -58,7 +58,9 @@ impl Service for Bridge {
             ports.readable().into_iter().filter(|topic| !KEPT.contains(&topic.as_str())).collect();
         let about = About::new(start, &config, &leaving)?;
         let mut taps = BTreeMap::new();
-        for topic in leaving.iter().filter(|topic| ![PilotState::TOPIC, Patrol::TOPIC].contains(&topic.as_str())) {
+        for topic in
+            leaving.iter().filter(|topic| ![PilotState::TOPIC, Patrol::TOPIC].contains(&topic.as_str()))
+        {
             let period = config.period_ns(topic);
             taps.insert(topic.clone(), taps::open(ports, topic, &keys.telemetry(topic), period)?);
         }

@@ -10,7 +10,7 @@ use crate::zenoh_config::{connecting, listening};
 use runtime::StartError;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use zenoh::query::Query;
 use zenoh::sample::Sample;
 use zenoh::{Config, Session, Wait};
@@ -67,12 +67,11 @@ struct Work {
     standing: Arc<Mutex<String>>,
     /// What the open sessions were opened with.
     papers: Option<Papers>,
-    /// What each connection to a router is, and the sentence about it when there is none.
-    links: Vec<(String, Option<Session>, String)>,
+    /// The routers, and the session with each that is reached.
+    links: Vec<(String, Option<Session>)>,
     listener: Option<Session>,
     /// Which port listens, when it was left to the system.
     listening: String,
-    tried: Option<Instant>,
 }
 
 fn now_s() -> i64 {
@@ -100,7 +99,6 @@ impl Keeper {
             links: Vec::new(),
             listener: None,
             listening: String::new(),
-            tried: None,
         };
         spawn("keep sessions", move || {
             loop {
@@ -155,7 +153,7 @@ impl Work {
         self.sessions.set(Vec::new());
         self.hearing.known(Clients::default());
         self.papers = None;
-        let open = self.listener.take().into_iter().chain(self.links.drain(..).filter_map(|(_, link, _)| link));
+        let open = self.listener.take().into_iter().chain(self.links.drain(..).filter_map(|(_, link)| link));
         for session in open.collect::<Vec<_>>() {
             // One that does not end by itself ends with the process.
             let _ = session.close().wait();
@@ -165,7 +163,6 @@ impl Work {
     /// Opens what is not open.
     fn open(&mut self) {
         let Some(papers) = self.papers.clone() else { return };
-        self.tried = Some(Instant::now());
         let mut troubles = Vec::new();
         if self.listener.is_none() && !self.config.listen.is_empty() {
             let config = listening(
@@ -179,8 +176,7 @@ impl Work {
             match session(&config, &self.hearing) {
                 Ok(session) => {
                     let locators = session.info().locators().wait();
-                    self.listening =
-                        locators.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+                    self.listening = locators.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
                     self.listener = Some(session);
                 }
                 Err(error) => {
@@ -189,22 +185,26 @@ impl Work {
             }
         }
         if self.links.is_empty() {
-            self.links =
-                self.config.connect.iter().map(|endpoint| (endpoint.clone(), None, String::new())).collect();
+            self.links = self.config.connect.iter().map(|endpoint| (endpoint.clone(), None)).collect();
         }
-        for (endpoint, link, _) in &mut self.links {
+        for (endpoint, link) in &mut self.links {
             if link.is_none() {
-                let config =
-                    connecting(&self.drone, &papers.clients, &papers.identity, endpoint, self.config.lease_ms);
+                let config = connecting(
+                    &self.drone,
+                    &papers.clients,
+                    &papers.identity,
+                    endpoint,
+                    self.config.lease_ms,
+                );
                 match session(&config, &self.hearing) {
                     Ok(session) => *link = Some(session),
                     Err(error) => troubles.push(format!("cannot reach the router {endpoint}: {error}")),
                 }
             }
         }
-        let links = self.links.iter().filter_map(|(_, link, _)| link.as_ref());
+        let links = self.links.iter().filter_map(|(_, link)| link.as_ref());
         let all: Vec<Session> = self.listener.iter().chain(links).cloned().collect();
-        let reached = self.links.iter().filter(|(_, link, _)| link.is_some()).count();
+        let reached = self.links.iter().filter(|(_, link)| link.is_some()).count();
         self.sessions.set(all);
         let clients = papers.clients.iter().count();
         let mut sentence = match (&self.listener, self.links.len()) {

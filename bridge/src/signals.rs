@@ -18,7 +18,8 @@ pub(crate) struct Signals {
 impl Signals {
     /// `None` when the manifest has no video.
     pub(crate) fn open(ports: &mut Ports, keys: Keys) -> Result<Option<Self>, StartError> {
-        let has = ports.may_publish(SignalIn::TOPIC) && ports.readable().iter().any(|topic| topic == SignalOut::TOPIC);
+        let has = ports.may_publish(SignalIn::TOPIC)
+            && ports.readable().iter().any(|topic| topic == SignalOut::TOPIC);
         if !has {
             return Ok(None);
         }

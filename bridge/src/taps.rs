@@ -129,12 +129,16 @@ mod tests {
         // (period of the steps, allowed period, expected in 10 s)
         for (step_ms, period_ms, expected) in [(20, 50, 200), (20, 100, 100), (50, 50, 200), (7, 200, 50)] {
             let mut pacer = Pacer::new(Some(period_ms * MS));
-            let passed = (0..10_000 / step_ms).filter(|step| pacer.pass(1000 * MS + step * step_ms * MS)).count();
+            let passed =
+                (0..10_000 / step_ms).filter(|step| pacer.pass(1000 * MS + step * step_ms * MS)).count();
             let off = (passed as i64 - expected).abs();
             assert!(off <= 1, "{passed} of {expected} with steps of {step_ms} ms");
         }
         let mut pacer = Pacer::new(Some(50 * MS));
-        assert!(pacer.pass(0) && pacer.pass(10_000 * MS) && !pacer.pass(10_001 * MS), "no burst after a pause");
+        assert!(
+            pacer.pass(0) && pacer.pass(10_000 * MS) && !pacer.pass(10_001 * MS),
+            "no burst after a pause"
+        );
         assert!(!Pacer::new(None).pass(u64::MAX));
     }
 }

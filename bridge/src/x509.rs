@@ -64,10 +64,14 @@ fn address(bytes: &[u8]) -> Option<String> {
 pub fn check_time(file: &str, facts: &Facts, now_s: i64) -> Result<(), String> {
     if now_s > facts.not_after_s {
         let days = (now_s - facts.not_after_s) / 86_400;
-        return Err(format!("{file}: not_after: the certificate ended {days} days ago: `sereno certs renew` makes new ones"));
+        return Err(format!(
+            "{file}: not_after: the certificate ended {days} days ago: `sereno certs renew` makes new ones"
+        ));
     }
     if now_s < facts.not_before_s {
-        return Err(format!("{file}: not_before: the certificate does not count yet: is this machine's clock right?"));
+        return Err(format!(
+            "{file}: not_before: the certificate does not count yet: is this machine's clock right?"
+        ));
     }
     Ok(())
 }

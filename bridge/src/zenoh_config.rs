@@ -112,7 +112,11 @@ pub fn listening(
 ) -> String {
     let mut config = base("peer", lease_ms, MAX_TO_DRONE, max_connections);
     set(&mut config, &["transport", "link", "tls"], tls(identity));
-    set(&mut config, &["listen"], json!({ "endpoints": endpoints, "exit_on_failure": true, "timeout_ms": 0 }));
+    set(
+        &mut config,
+        &["listen"],
+        json!({ "endpoints": endpoints, "exit_on_failure": true, "timeout_ms": 0 }),
+    );
     set(&mut config, &["connect"], json!({ "endpoints": [] }));
     set(&mut config, &["access_control"], acl::of_drone(drone, clients));
     set(&mut config, &["low_pass_filter"], sizes());
@@ -121,10 +125,20 @@ pub fn listening(
 
 /// How a drone connects to a router.
 #[must_use]
-pub fn connecting(drone: &str, clients: &Clients, identity: &Identity, endpoint: &str, lease_ms: u32) -> String {
+pub fn connecting(
+    drone: &str,
+    clients: &Clients,
+    identity: &Identity,
+    endpoint: &str,
+    lease_ms: u32,
+) -> String {
     let mut config = base("client", lease_ms, MAX_TO_DRONE, 1);
     set(&mut config, &["transport", "link", "tls"], tls(identity));
-    set(&mut config, &["connect"], json!({ "endpoints": [endpoint], "exit_on_failure": true, "timeout_ms": 0 }));
+    set(
+        &mut config,
+        &["connect"],
+        json!({ "endpoints": [endpoint], "exit_on_failure": true, "timeout_ms": 0 }),
+    );
     set(&mut config, &["access_control"], acl::of_drone(drone, clients));
     set(&mut config, &["low_pass_filter"], sizes());
     config.to_string()
@@ -196,8 +210,11 @@ fn parse(text: &str) -> Option<Value> {
 pub fn endpoints_of(text: &str) -> Option<Vec<String>> {
     let config = parse(text)?;
     for part in ["connect", "listen"] {
-        let endpoints: Vec<String> =
-            config[part]["endpoints"].as_array()?.iter().filter_map(|e| e.as_str().map(str::to_owned)).collect();
+        let endpoints: Vec<String> = config[part]["endpoints"]
+            .as_array()?
+            .iter()
+            .filter_map(|e| e.as_str().map(str::to_owned))
+            .collect();
         if !endpoints.is_empty() {
             return Some(endpoints);
         }
@@ -219,6 +236,7 @@ pub struct Owner {
 pub fn owner_of(text: &str) -> Option<Owner> {
     let config = parse(text)?;
     let metadata = &config["metadata"];
-    let drones = metadata["drones"].as_array()?.iter().filter_map(|drone| drone.as_str().map(str::to_owned)).collect();
+    let drones =
+        metadata["drones"].as_array()?.iter().filter_map(|drone| drone.as_str().map(str::to_owned)).collect();
     Some(Owner { certificate: metadata["certificate"].as_str()?.to_owned(), drones })
 }

@@ -17,7 +17,9 @@ fn guard() -> Standing {
 
 fn made(directory: &Path) -> Authority {
     let authority = Authority::at(directory.join("certs"));
-    authority.init(&["sereno-1".into()], &["drone.lan".into(), "10.0.0.7".into()], &[HERE.into()], NOW_S).unwrap();
+    authority
+        .init(&["sereno-1".into()], &["drone.lan".into(), "10.0.0.7".into()], &[HERE.into()], NOW_S)
+        .unwrap();
     authority
 }
 
@@ -46,7 +48,11 @@ fn what_is_made_is_accepted_and_secrets_are_the_owners() {
             secrets += usize::from(secret);
         }
     }
-    assert_eq!(secrets, 3 + 2 * 2, "authority, drone and page; two clients with a key and a configuration each");
+    assert_eq!(
+        secrets,
+        3 + 2 * 2,
+        "authority, drone and page; two clients with a key and a configuration each"
+    );
 }
 
 #[test]
@@ -66,13 +72,20 @@ fn what_is_wrong_is_named_with_file_and_field() {
     type Damage = fn(&Path, &Path);
     let cases: [(&str, i64, Damage, &str); 10] = [
         ("nothing", 0, |own, _| fs::remove_dir_all(own).unwrap(), "has no ca.pem: `sereno certs init` makes"),
-        ("no key", 0, |own, _| fs::remove_file(own.join("sereno-1.key")).unwrap(), "sereno-1.key: No such file"),
+        (
+            "no key",
+            0,
+            |own, _| fs::remove_file(own.join("sereno-1.key")).unwrap(),
+            "sereno-1.key: No such file",
+        ),
         ("ended", 500 * DAY_S, |_, _| {}, "sereno-1.pem: not_after: the certificate ended 134 days ago"),
         ("not yet", -3 * DAY_S, |_, _| {}, "not_before: the certificate does not count yet"),
         (
             "readable",
             0,
-            |own, _| fs::set_permissions(own.join("sereno-1.key"), fs::Permissions::from_mode(0o644)).unwrap(),
+            |own, _| {
+                fs::set_permissions(own.join("sereno-1.key"), fs::Permissions::from_mode(0o644)).unwrap()
+            },
             "sereno-1.key: mode 644: a private key must be readable by its owner alone",
         ),
         (
@@ -93,7 +106,12 @@ fn what_is_wrong_is_named_with_file_and_field() {
             |own, _| drop(fs::copy(own.join("https.pem"), own.join("sereno-1.pem")).unwrap()),
             "sereno-1.pem: common name = Sereno console: must be sereno-1",
         ),
-        ("junk", 0, |own, _| fs::write(own.join("sereno-1.pem"), b"junk").unwrap(), "no certificate in PEM form"),
+        (
+            "junk",
+            0,
+            |own, _| fs::write(own.join("sereno-1.pem"), b"junk").unwrap(),
+            "no certificate in PEM form",
+        ),
         (
             "no list",
             0,

@@ -72,5 +72,9 @@ fn the_examples_follow_the_pose_and_start_a_round() {
 
     let stranger = run("follow_pose.py", "revoked", "1");
     assert_eq!(stranger.status.code(), Some(1));
-    assert!(text(&stranger.stderr).contains("none that knows this certificate"), "{}", text(&stranger.stderr));
+    assert!(
+        text(&stranger.stderr).contains("none that knows this certificate"),
+        "{}",
+        text(&stranger.stderr)
+    );
 }

@@ -96,7 +96,8 @@ fn endpoints(authority: &Authority, given: &[String]) -> Result<Vec<String>> {
     let mut found = Vec::new();
     for listed in authority.list().unwrap_or_default().iter().filter(|listed| listed.standing == "drone") {
         let text = std::fs::read_to_string(&listed.file)?;
-        let facts = bridge::x509::facts(&listed.file.display().to_string(), &text).map_err(anyhow::Error::msg)?;
+        let facts =
+            bridge::x509::facts(&listed.file.display().to_string(), &text).map_err(anyhow::Error::msg)?;
         let own = ["localhost", "127.0.0.1", "::1"];
         found.extend(facts.hosts.iter().find(|host| !own.contains(&host.as_str())).map(|host| {
             let host = if host.contains(':') { format!("[{host}]") } else { host.clone() };
@@ -119,7 +120,8 @@ pub(crate) fn run(place: &Place, certs: &Certs, json: bool) -> Result<ExitCode> 
     let mut said = Vec::new();
     match &certs.order {
         CertsOrder::Init { hosts, names, endpoints: given } => {
-            let names = if names.is_empty() { vec![place.manifest(false)?.0.system.name] } else { names.clone() };
+            let names =
+                if names.is_empty() { vec![place.manifest(false)?.0.system.name] } else { names.clone() };
             let given = match (given.as_slice(), hosts.first()) {
                 ([], Some(host)) => vec![format!("tls/{host}:7447")],
                 ([], None) => vec!["tls/127.0.0.1:7447".to_owned()],
@@ -141,7 +143,10 @@ pub(crate) fn run(place: &Place, certs: &Certs, json: bool) -> Result<ExitCode> 
         }
         CertsOrder::Router { name, endpoints } => {
             let directory = authority.client(name, Standing::Router, endpoints, now)?;
-            said.push(format!("{name} is a router: zenohd --config {}", directory.join(format!("{name}.json5")).display()));
+            said.push(format!(
+                "{name} is a router: zenohd --config {}",
+                directory.join(format!("{name}.json5")).display()
+            ));
         }
         CertsOrder::Revoke { name } => {
             if !authority.revoke(name)? {
@@ -154,7 +159,10 @@ pub(crate) fn run(place: &Place, certs: &Certs, json: bool) -> Result<ExitCode> 
             said.push(if renewed.is_empty() {
                 "nothing ends within 60 days".to_owned()
             } else {
-                format!("made again: {}; carry the directories of clients to their machines", renewed.join(", "))
+                format!(
+                    "made again: {}; carry the directories of clients to their machines",
+                    renewed.join(", ")
+                )
             });
         }
         CertsOrder::List => {
@@ -165,8 +173,17 @@ pub(crate) fn run(place: &Place, certs: &Certs, json: bool) -> Result<ExitCode> 
                         "not_after_s": listed.not_after_s, "file": listed.file });
                     println!("{row}");
                 } else {
-                    let ends = if days < 0 { format!("ended {} days ago", -days) } else { format!("{days} days left") };
-                    println!("{:<24} {:<14} {ends:<20} {}", listed.name, listed.standing, listed.file.display());
+                    let ends = if days < 0 {
+                        format!("ended {} days ago", -days)
+                    } else {
+                        format!("{days} days left")
+                    };
+                    println!(
+                        "{:<24} {:<14} {ends:<20} {}",
+                        listed.name,
+                        listed.standing,
+                        listed.file.display()
+                    );
                 }
             }
             return Ok(ExitCode::SUCCESS);
@@ -177,8 +194,9 @@ pub(crate) fn run(place: &Place, certs: &Certs, json: bool) -> Result<ExitCode> 
         }
         CertsOrder::Trust { print } | CertsOrder::Untrust { print } => {
             let ca = authority.directory().join("ca.pem");
-            let text = std::fs::read_to_string(&ca)
-                .map_err(|error| anyhow::anyhow!("cannot read {}: {error}: `sereno certs init` makes it", ca.display()))?;
+            let text = std::fs::read_to_string(&ca).map_err(|error| {
+                anyhow::anyhow!("cannot read {}: {error}: `sereno certs init` makes it", ca.display())
+            })?;
             let facts = bridge::x509::facts(&ca.display().to_string(), &text).map_err(anyhow::Error::msg)?;
             trust::run(&ca, &facts.name, matches!(certs.order, CertsOrder::Trust { .. }), *print)?;
             return Ok(ExitCode::SUCCESS);

@@ -36,6 +36,7 @@ pub(crate) fn check(place: &Place, json: bool) -> Result<ExitCode> {
         config::<localization::Localization>(&manifest, &root)?;
         config::<navigation::Navigation>(&manifest, &root)?;
         config::<pilot::Pilot>(&manifest, &root)?;
+        config::<bridge::Bridge>(&manifest, &root)?;
         if sim {
             config::<simulator::Simulator>(&manifest, &root)?;
         }

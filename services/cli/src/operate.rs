@@ -43,7 +43,9 @@ impl Order {
     /// Cuts the motors, when it is said that the drone falls.
     pub(crate) fn cut(yes_it_falls: bool) -> Result<Self> {
         if !yes_it_falls {
-            bail!("cut: stops the motors at once, and in the air the drone falls; say --yes-it-falls if that is meant");
+            bail!(
+                "cut: stops the motors at once, and in the air the drone falls; say --yes-it-falls if that is meant"
+            );
         }
         Ok(Self::Cut)
     }

@@ -124,7 +124,9 @@ fn rate(followed: &Followed, topic: &str, seconds: f64, json: bool) -> Result<Ex
             json!({ "topic": topic, "messages": messages, "hz": hz, "longest_gap_ms": longest, "lost": left_out })
         );
     } else {
-        println!("{topic}: {hz:.1} Hz over {messages} messages, longest gap {longest:.1} ms, {left_out} left out or lost");
+        println!(
+            "{topic}: {hz:.1} Hz over {messages} messages, longest gap {longest:.1} ms, {left_out} left out or lost"
+        );
     }
     Ok(ExitCode::SUCCESS)
 }

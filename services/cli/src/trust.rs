@@ -88,7 +88,10 @@ pub(crate) fn run(ca: &Path, name: &str, trust: bool, print: bool) -> Result<()>
             continue;
         }
         let Some((program, arguments)) = step.split_first() else { continue };
-        let output = Command::new(program).args(arguments).output().with_context(|| format!("cannot run {program}"))?;
+        let output = Command::new(program)
+            .args(arguments)
+            .output()
+            .with_context(|| format!("cannot run {program}"))?;
         if !output.status.success() {
             let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
             let all: Vec<String> = steps.iter().map(shown).collect();
@@ -106,7 +109,9 @@ mod tests {
     #[test]
     fn what_is_added_is_what_is_removed() {
         let all = Machine { debian: true, p11: true, nss: Some(PathBuf::from("/home/ana/.pki/nssdb")) };
-        let steps = |trust| all.steps(Path::new("/c/ca.pem"), "Sereno x 12", trust).iter().map(shown).collect::<Vec<_>>();
+        let steps = |trust| {
+            all.steps(Path::new("/c/ca.pem"), "Sereno x 12", trust).iter().map(shown).collect::<Vec<_>>()
+        };
         assert_eq!(
             steps(true),
             [

@@ -153,7 +153,10 @@ impl Answers {
     /// Hears navigation.
     pub fn hear_navigation(&mut self, patrol: &Patrol) {
         let [_, navigation] = &mut self.heard;
-        note(navigation, Reply::of(self.number, patrol.command_sequence, patrol.answer, patrol.answer_text.as_str()));
+        note(
+            navigation,
+            Reply::of(self.number, patrol.command_sequence, patrol.answer, patrol.answer_text.as_str()),
+        );
     }
 
     /// Whether all has been said that is to be waited for.

@@ -67,7 +67,13 @@ impl Client {
     }
 
     /// Gives an order under a name; `None` when nobody answers.
-    pub(crate) fn give_as(&self, name: &str, verb: Verb, payload: Vec<u8>, patience: Duration) -> Option<Value> {
+    pub(crate) fn give_as(
+        &self,
+        name: &str,
+        verb: Verb,
+        payload: Vec<u8>,
+        patience: Duration,
+    ) -> Option<Value> {
         let key = self.keys.command(&verb_word(verb), name);
         self.ask(&key, Some(payload), patience).map(|bytes| serde_json::from_slice(&bytes).unwrap())
     }

@@ -136,7 +136,10 @@ fn a_router_between_changes_nothing() {
     zenoh::Wait::wait(router.close()).unwrap();
     drop(router);
     let router = zenoh::Wait::wait(zenoh::open(zenoh::Config::from_json5(&config).unwrap())).unwrap();
-    assert!(connect(&system, "guard").hears("sereno/sereno-1/telemetry/localization/pose", Duration::from_secs(20)));
+    assert!(
+        connect(&system, "guard")
+            .hears("sereno/sereno-1/telemetry/localization/pose", Duration::from_secs(20))
+    );
     drop(router);
 }
 
@@ -148,7 +151,9 @@ fn strangers_get_nothing(system: &System) {
     let text = std::fs::read_to_string(&own).unwrap();
     let endpoint = bridge::zenoh_config::endpoints_of(&text).unwrap();
     other.init(&["sereno-1".into()], &[], &endpoint, now_s()).unwrap();
-    other.client("guard", bridge::roles::Standing::Client(bridge::roles::Role::Guard), &endpoint, now_s()).unwrap();
+    other
+        .client("guard", bridge::roles::Standing::Client(bridge::roles::Role::Guard), &endpoint, now_s())
+        .unwrap();
     // It trusts the drone as the true guard does: the drone is who refuses.
     let encoded = {
         use base64::Engine;
@@ -268,7 +273,11 @@ fn bad_input_changes_nothing(system: &System) {
     let mut guard = connect(system, "guard");
     accepted(&mut guard, Verb::AutomaticOn);
     let after = system.ps("bridge");
-    assert_eq!((&before["pid"], &before["restarts"]), (&after["pid"], &after["restarts"]), "the bridge lives on");
+    assert_eq!(
+        (&before["pid"], &before["restarts"]),
+        (&after["pid"], &after["restarts"]),
+        "the bridge lives on"
+    );
 }
 
 /// `sereno --remote` prints what `sereno` prints on board.
@@ -296,7 +305,11 @@ fn the_command_line_does_the_same(system: &System) {
     assert!(text(&refused.stderr).contains("takeoff: a viewer may not order"), "{}", text(&refused.stderr));
     let stranger = system.remote("revoked", &["takeoff"]);
     assert_eq!(stranger.status.code(), Some(1));
-    assert!(text(&stranger.stderr).contains("does not know the certificate revoked"), "{}", text(&stranger.stderr));
+    assert!(
+        text(&stranger.stderr).contains("does not know the certificate revoked"),
+        "{}",
+        text(&stranger.stderr)
+    );
     let local = system.remote("guard", &["ps"]);
     assert!(text(&local.stderr).contains("is for the machine of the drone"), "{}", text(&local.stderr));
 }

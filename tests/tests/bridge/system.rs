@@ -64,9 +64,12 @@ impl System {
         let authority = Authority::at(deploy.join("certs"));
         let endpoints = [endpoint.to_owned()];
         authority.init(&["sereno-1".into()], &[], &endpoints, now_s()).unwrap();
-        for (name, role) in
-            [("guard", Role::Guard), ("viewer", Role::Viewer), ("other", Role::Guard), ("revoked", Role::Guard)]
-        {
+        for (name, role) in [
+            ("guard", Role::Guard),
+            ("viewer", Role::Viewer),
+            ("other", Role::Guard),
+            ("revoked", Role::Guard),
+        ] {
             authority.client(name, Standing::Client(role), &endpoints, now_s()).unwrap();
         }
         authority.revoke("revoked").unwrap();
@@ -109,7 +112,8 @@ impl System {
     }
 
     pub(crate) fn ps(&self, service: &str) -> Value {
-        let overview: Value = serde_json::from_slice(&self.sereno(&["ps", "--json"]).stdout).unwrap_or_default();
+        let overview: Value =
+            serde_json::from_slice(&self.sereno(&["ps", "--json"]).stdout).unwrap_or_default();
         let rows = overview["services"].as_array().cloned().unwrap_or_default();
         rows.into_iter().find(|row| row["name"] == service).unwrap_or_default()
     }

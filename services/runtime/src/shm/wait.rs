@@ -11,11 +11,7 @@ use rustix::fd::BorrowedFd;
 ///
 /// The listener's own `timed_wait` sets a receive timeout on its socket, which the kernel rounds up to its clock
 /// ticks: on a kernel of 250 Hz a tick of 5 ms came every 9. `poll` is as exact as the machine's timers.
-pub(crate) fn woken_within(
-    listener: &Listener<ipc::Service>,
-    waker: Option<&Waker>,
-    wait_ns: u64,
-) -> bool {
+pub(crate) fn woken_within(listener: &Listener<ipc::Service>, waker: Option<&Waker>, wait_ns: u64) -> bool {
     if wait_ns > 0 {
         #[allow(unsafe_code, reason = "iceoryx2 does not lend its descriptor in a safer way")]
         // SAFETY: the descriptor belongs to the listener, which is borrowed for longer than `socket` lives.
