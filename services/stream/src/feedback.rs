@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use std::time::Instant;
 
 /// Behind every interceptor of the library: all have seen a packet before this one drops it.
-pub(crate) const SLOT: u16 = 14_000;
+pub(crate) const SLOT: usize = 14_000;
 
 /// Passes picture loss indications (RFC 4585) and full intra requests (RFC 5104) on, and drops what else comes back.
 #[derive(Default)]

@@ -7,8 +7,6 @@ use rtc::interceptor::Slot;
 use rtc::media_stream::MediaStreamTrack;
 use rtc::peer_connection::configuration::media_engine::{MIME_TYPE_H264, MIME_TYPE_RTX};
 use rtc::rtp::codec::h264::H264Payloader;
-use rtc::rtp::extension::HeaderExtension;
-use rtc::rtp::extension::playout_delay_extension::PlayoutDelayExtension;
 use rtc::rtp::packetizer::Payloader;
 use rtc::rtp::{Header, Packet};
 use rtc::rtp_transceiver::rtp_sender::{
@@ -37,6 +35,8 @@ const RTX: u8 = 103;
 const CLOCK_HZ: u64 = 90_000;
 /// Bytes of payload in a packet: fits with all headers into the 1280 bytes that every IPv6 line carries.
 const PAYLOAD: usize = 1120;
+/// Least and most delay of the playout, 12 bits each: none.
+const AT_ONCE: Bytes = Bytes::from_static(&[0; 3]);
 const PLAYOUT_DELAY: &str = "http://www.webrtc.org/experiments/rtp-hdrext/playout-delay";
 
 /// What a connection tells its session.
@@ -77,6 +77,8 @@ pub(crate) struct Peer {
     sequence: u16,
     /// Number of the codec as negotiated; `None` before.
     payload_type: Option<u8>,
+    /// Number of the playout delay as negotiated; `None` for a browser that does not know it.
+    playout_delay: Option<u8>,
     mode: Mode,
 }
 
@@ -159,6 +161,7 @@ impl Peer {
             ssrc,
             sequence: runtime::mix_seed(number, 2) as u16,
             payload_type: None,
+            playout_delay: None,
             mode,
         })
     }
@@ -174,10 +177,13 @@ impl Peer {
     pub(crate) async fn answer(&mut self, sdp: String) -> Result<(), Error> {
         let answer = RTCSessionDescription::answer(sdp)?;
         self.connection.set_remote_description(answer).await?;
-        let codecs = self.sender.get_parameters().await?.rtp_parameters.codecs;
-        let negotiated =
-            codecs.iter().find(|codec| codec.rtp_codec.mime_type.eq_ignore_ascii_case(MIME_TYPE_H264));
-        self.payload_type = negotiated.map(|codec| codec.payload_type);
+        let negotiated = self.sender.get_parameters().await?.rtp_parameters;
+        let mut codecs = negotiated.codecs.iter();
+        let codec = codecs.find(|codec| codec.rtp_codec.mime_type.eq_ignore_ascii_case(MIME_TYPE_H264));
+        self.payload_type = codec.map(|codec| codec.payload_type);
+        let mut extensions = negotiated.header_extensions.iter();
+        let delay = extensions.find(|extension| extension.uri == PLAYOUT_DELAY);
+        self.playout_delay = delay.and_then(|extension| u8::try_from(extension.id).ok());
         if self.payload_type.is_none() {
             return Err(Error::Other("the browser has no decoder for H.264 constrained baseline".to_owned()));
         }
@@ -204,7 +210,7 @@ impl Peer {
         let last = payloads.len();
         for (index, payload) in payloads.into_iter().enumerate() {
             self.sequence = self.sequence.wrapping_add(1);
-            let header = Header {
+            let mut header = Header {
                 version: 2,
                 marker: index + 1 == last,
                 payload_type,
@@ -213,13 +219,10 @@ impl Peer {
                 ssrc: self.ssrc,
                 ..Default::default()
             };
-            let packet = Packet { header, payload };
-            if self.mode == Mode::Pilot {
-                let now = HeaderExtension::PlayoutDelay(PlayoutDelayExtension { min_delay: 0, max_delay: 0 });
-                self.track.write_rtp_with_extensions(packet, &[now]).await?;
-            } else {
-                self.track.write_rtp(packet).await?;
+            if let (Mode::Pilot, Some(id)) = (self.mode, self.playout_delay) {
+                header.set_extension(id, AT_ONCE)?;
             }
+            self.track.write_rtp(Packet { header, payload }).await?;
         }
         Ok(())
     }

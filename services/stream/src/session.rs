@@ -81,7 +81,7 @@ async fn talk(peer: &mut Peer, ends: &mut Ends, heard: &mut mpsc::Receiver<Event
     let mut second = interval(Duration::from_secs(1));
     let (mut deadline, mut connected) = (Some(Instant::now() + CONNECT), false);
     let (mut needs_key, mut asked) = (true, None::<Instant>);
-    let (mut candidates, mut answered) = (0, false);
+    let (mut candidates, mut answered, mut listening) = (0, false, true);
     let mut early = Vec::new();
     let mut last = None::<Arc<Unit>>;
     let mut lost = 0;
@@ -129,18 +129,17 @@ async fn talk(peer: &mut Peer, ends: &mut Ends, heard: &mut mpsc::Receiver<Event
                     let _ = ends.say.send(ToViewer::Candidate(candidate)).await;
                 }
                 Some(Event::State(State::Connected)) => {
-                    (deadline, connected, needs_key) = (None, true, true);
+                    (deadline, connected, needs_key, listening) = (None, true, true, true);
                     ends.key_requests.fetch_add(1, Ordering::Relaxed);
                 }
                 Some(Event::State(State::Failed | State::Closed)) => return "the connection has ended".to_owned(),
                 Some(Event::State(State::Disconnected)) => deadline = Some(Instant::now() + LOST),
                 Some(Event::State(_)) => {}
             },
-            more = key_requested(&track), if answered => {
-                if !more {
-                    return "the connection has ended".to_owned();
-                }
-                if asked.is_none_or(|at| at.elapsed() >= KEY_PAUSE) {
+            more = key_requested(&track), if connected && listening => {
+                // A track that is not bound hears nothing; the connection's own state says when it has ended.
+                listening = more;
+                if more && asked.is_none_or(|at| at.elapsed() >= KEY_PAUSE) {
                     asked = Some(Instant::now());
                     ends.key_requests.fetch_add(1, Ordering::Relaxed);
                 }
