@@ -268,13 +268,26 @@ test("the event log tells what changed, not what was", () => {
   assert.equal(chronicle.entries.length, 300);
 });
 
+test("a failsafe that flickers is one line; one that comes again later is another", () => {
+  const chronicle = new Chronicle();
+  chronicle.look(pilot(), null, null, 0);
+  for (let at = 1000; at < 9000; at += 400) {
+    chronicle.look(pilot({ cause: 2, action: 1 }), null, null, at);
+    chronicle.look(pilot(), null, null, at + 200);
+  }
+  assert.deepEqual(chronicle.entries.map((entry) => entry.key), ["event.failsafe_over", "event.failsafe"]);
+  chronicle.look(pilot({ cause: 2, action: 1 }), null, null, 60_000);
+  assert.equal(chronicle.entries.length, 3);
+});
+
 test("what the console tells of before stands in its place, once, and is no news", () => {
   const chronicle = new Chronicle(1000);
   chronicle.look(pilot({ phase: 0 }), null, null, 1000);
   chronicle.look(pilot({ phase: 2 }), null, null, 1500);
   const history = [
     { time_ms: 100, kind: "phase", text: "take-off" }, { time_ms: 200, kind: "failsafe", text: "position uncertain", verb: "hover" }, { time_ms: 300, kind: "failsafe", text: "none" },
-    { time_ms: 400, kind: "round", text: "landed_on_pad", report: 7 }, { time_ms: 1400, kind: "phase", text: "take-off" },
+    { time_ms: 400, kind: "round", text: "landed_on_pad", report: 7 }, { time_ms: 500, kind: "failsafe", text: "a side sonar is silent", verb: "none" }, { time_ms: 600, kind: "failsafe", text: "none" },
+    { time_ms: 1400, kind: "phase", text: "take-off" },
   ];
   for (let k = 0; k < 3; k += 1) for (const line of history) chronicle.told(line, 2000);
   assert.deepEqual(chronicle.entries.map((entry) => [entry.at, entry.key]), [[1500, "phase.takeoff"], [400, "event.report"], [300, "event.failsafe_over"], [200, "event.failsafe"], [100, "phase.takeoff"]]);

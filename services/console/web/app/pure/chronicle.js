@@ -3,6 +3,8 @@
 import { ACTIONS, CAUSES, PATROL, PHASES, ROOMS, STICKS, word } from "./codes.js";
 
 const MOST = 300;
+/** Within this a failsafe that ended goes on. */
+const AGAIN_MS = 5000;
 /** The pilot's words for its phases, where they are not those of the word lists. */
 const PHASE_WORD = { "take-off": "takeoff", "emergency landing": "emergency" };
 const PHASE_TONE = { emergency: "alarm", cut: "alarm", manual: "lamp" };
@@ -15,6 +17,7 @@ export class Chronicle {
     this.before = null;
     /** Number of the newest report that was written while this page looked on; null before any. */
     this.report = null;
+    this.over = null;
     this.began = began;
     this.told_before = new Set();
   }
@@ -24,6 +27,7 @@ export class Chronicle {
     const place = this.entries.findIndex((entry) => entry.at <= at);
     this.entries.splice(place < 0 ? this.entries.length : place, 0, { number: this.count, at, kind, tone, key, values });
     if (this.entries.length > MOST) this.entries.length = MOST;
+    return this.count;
   }
   /** Compares with what was there at the last look; the first look tells nothing but how things stand. */
   look(pilot, patrol, pose, at) {
@@ -40,12 +44,7 @@ export class Chronicle {
     this.before = { ...now, rooms: now.rooms ?? before?.rooms ?? null, phase: now.phase ?? before?.phase, round: now.round ?? before?.round };
     if (!before) return;
     if (before.phase && now.phase && now.phase !== before.phase) this.add(at, "phase", PHASE_TONE[now.phase] ?? "info", `phase.${now.phase}`);
-    if (now.failsafe !== before.failsafe) {
-      if (now.failsafe) {
-        const [cause, action] = now.failsafe.split("/");
-        this.add(at, "failsafe", "alarm", "event.failsafe", { cause: { key: `cause.${cause}` }, action: { key: `action.${action}` } });
-      } else this.add(at, "failsafe", "ok", "event.failsafe_over");
-    }
+    if (now.failsafe !== before.failsafe) this.failsafe(now.failsafe, before.failsafe, at);
     if (now.holder !== before.holder) {
       if (now.holder) this.add(at, "sticks", "lamp", "event.holder", { holder: now.holder });
       else this.add(at, "sticks", "info", "event.no_holder");
@@ -57,6 +56,22 @@ export class Chronicle {
       if (!was || was.state === room.state || !["seen", "skipped", "partly"].includes(room.state)) continue;
       this.add(at, "room", room.state === "seen" ? "ok" : "caution", `event.room_${room.state}`, { room: room.name, reason: { sentence: room.reason } });
     }
+  }
+  /** A failsafe that comes again at once is the same one going on: its end is taken back. */
+  failsafe(now, before, at) {
+    if (!now) {
+      this.over = { failsafe: before, at, number: this.add(at, "failsafe", "ok", "event.failsafe_over") };
+      return;
+    }
+    const { over } = this;
+    this.over = null;
+    if (over && over.failsafe === now && at - over.at < AGAIN_MS) {
+      this.entries = this.entries.filter((entry) => entry.number !== over.number);
+      this.count += 1;
+      return;
+    }
+    const [cause, action] = now.split("/");
+    this.add(at, "failsafe", "alarm", "event.failsafe", { cause: { key: `cause.${cause}` }, action: { key: `action.${action}` } });
   }
   /** An order of one's own that never got through; what came of all others the console tells everybody. */
   ordered(verb, { outcome }, at) {
@@ -91,6 +106,12 @@ export class Chronicle {
   /** A phase or a failsafe from before this page was opened. */
   toldState({ time_ms, kind, text, verb }) {
     if (kind === "failsafe") {
+      // What does nothing and what a guard ordered is no failsafe to a guard, and its end says nothing either.
+      const quiet = verb === "none" || text === "operator";
+      const ended = text === "none";
+      const silent = quiet || (ended && this.quiet);
+      this.quiet = quiet;
+      if (silent) return;
       if (text === "none") this.add(time_ms, "failsafe", "ok", "event.failsafe_over");
       else this.add(time_ms, "failsafe", "alarm", "event.failsafe", { cause: { sentence: text }, action: { sentence: verb ?? "" } });
       return;

@@ -57,7 +57,7 @@ function figure(words, value) {
 function roomRow(room) {
   return h("tr", {},
     h("td", {}, h("strong", {}, room.name)),
-    h("td", { "data-name": t("reports.state") }, h("span", { class: `pill ${{ seen: "ok", partly: "caution", skipped: "alarm" }[room.state] ?? ""}` }, t(`room.${room.state}`))),
+    h("td", { "data-name": t("reports.state") }, h("span", { class: `pill ${{ seen: "ok", partly: "caution", skipped: "alarm" }[room.state] ?? ""}` }, t({ waiting: "report.not_reached", entered: "report.not_finished" }[room.state] ?? `room.${room.state}`))),
     h("td", { "data-name": t("reports.coverage") }, coverageBar(room.seen)),
     h("td", { "data-name": t("reports.times") }, [room.entered_ms, room.left_ms].filter(Boolean).map(timeOfDay).join(" – ") || "–"),
     h("td", { "data-name": t("reports.reason") }, room.reason ? sentence(room.reason) : ""));

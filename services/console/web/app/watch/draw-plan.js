@@ -65,21 +65,26 @@ export function drawGround(view, seen) {
 
 /** Without the bitmap of seen cells each room is lit by its share. */
 function drawSeenRooms(view, patrol) {
-  const { context, projection, palette, ground, ratio, session } = view;
-  const rooms = (patrol.rooms ?? []).slice(0, patrol.rooms_used).filter((room) => word(ROOMS, room.state) !== "skipped");
+  const { context, palette, ground, projection, ratio, session } = view;
+  const rooms = (patrol.rooms ?? []).slice(0, patrol.rooms_used).filter((room) => word(ROOMS, room.state) !== "skipped" && room.seen > 0);
   const shares = new Map(rooms.map((room) => [room.name, room.seen]));
-  context.save();
-  ground.place(context, projection, ratio);
-  context.clip(ground.floor);
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  context.fillStyle = palette.lit;
+  const light = new OffscreenCanvas(ground.width, ground.height);
+  const pixels = light.getContext("2d");
+  pixels.fillStyle = palette.lit;
   for (const room of session.about?.rooms ?? []) {
-    const share = shares.get(room.name) ?? 0;
-    if (share <= 0) continue;
-    context.globalAlpha = share;
-    outline(context, projection, room);
-    context.fill();
+    if (!shares.has(room.name)) continue;
+    pixels.globalAlpha = Math.min(shares.get(room.name), 1);
+    pixels.beginPath();
+    room.corners.forEach(([x_m, y_m], k) => pixels[k === 0 ? "moveTo" : "lineTo"](...ground.pixel(x_m, y_m)));
+    pixels.fill();
   }
+  pixels.globalAlpha = 1;
+  pixels.globalCompositeOperation = "destination-in";
+  pixels.drawImage(ground.mask, 0, 0);
+  context.save();
+  context.imageSmoothingEnabled = false;
+  ground.place(context, projection, ratio);
+  context.drawImage(light, 0, 0);
   context.restore();
 }
 

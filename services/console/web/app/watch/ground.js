@@ -9,7 +9,7 @@ const FLOOR = 230;
 /** Above this a plan is traced from a smaller copy. */
 const MOST_PIXELS = 4_000_000;
 
-/** {floor, walls: Path2D in pixels, width, height, box: metres, toPlan(context, projection)} */
+/** {floor, walls: Path2D in pixels, mask: the floor as an image, width, height, box: metres, pixel(x_m, y_m), place(context, projection, ratio)} */
 export async function loadGround(drone, about) {
   const image = new Image();
   image.src = planUrl(drone);
@@ -27,12 +27,17 @@ export async function loadGround(drone, about) {
     for (const [x, y, w, h] of rectangles(width, height, is)) shape.rect(x, y, w, h);
     return shape;
   };
+  const mask = new OffscreenCanvas(width, height);
+  const pixels = new ImageData(width, height);
+  for (let index = 0; index < width * height; index += 1) pixels.data[4 * index + 3] = grey(index) >= FLOOR ? 255 : 0;
+  mask.getContext("2d").putImageData(pixels, 0, 0);
   const cell = (about.resolution_m * image.naturalWidth) / width;
   return {
     floor: path((index) => grey(index) >= FLOOR),
     walls: path((index) => grey(index) < WALL),
-    width, height, cell,
+    mask, width, height, cell,
     box: inked(grey, width, height, cell, about),
+    pixel: (x_m, y_m) => [(x_m - about.origin_x_m) / cell, height - (y_m - about.origin_y_m) / cell],
     /** Sets the context so that the paths lie where they belong. */
     place(context, projection, ratio) {
       const scale = projection.scale * cell * ratio;

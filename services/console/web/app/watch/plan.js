@@ -3,7 +3,8 @@
 import { Projection } from "../pure/projection.js";
 import { h, iconButton, setData, show } from "../view/dom.js";
 import { t } from "../words/text.js";
-import { SeenImage, drawGround, drawPad, drawRooms, drawScale, drawZones } from "./draw-plan.js";
+import { BaseLayer } from "./base-layer.js";
+import { drawScale } from "./draw-plan.js";
 import { drawDrone, drawPath, drawPlaces, drawRoute, drawTarget } from "./draw-drone.js";
 import { GridImage, drawGrid, drawParticles, drawSonar } from "./draw-layers.js";
 import { loadGround } from "./ground.js";
@@ -31,7 +32,7 @@ export class PlanPanel {
       session, projection: new Projection(), palette: readPalette(), context: this.canvas.getContext("2d"), ground: null,
       ratio: 1, em: 16, shown: null, radius_m: 0.225,
     };
-    this.seen = new SeenImage();
+    this.base = new BaseLayer();
     this.gridImage = new GridImage();
     this.target = null;
     this.asking = null;
@@ -243,11 +244,8 @@ export class PlanPanel {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.fillStyle = palette.void;
     context.fillRect(0, 0, projection.width, projection.height);
-    drawGround(view, this.seen);
+    this.base.draw(view);
     if (session.layers.has("grid")) drawGrid(view, this.gridImage);
-    drawZones(view);
-    drawRooms(view);
-    drawPad(view);
     if (session.layers.has("particles")) drawParticles(view);
     if (session.layers.has("route")) drawRoute(view);
     if (session.layers.has("path")) drawPath(view);

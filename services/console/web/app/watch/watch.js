@@ -93,6 +93,7 @@ export function watchView(drone, { account, drones }) {
       manual?.end();
       manual = null;
       session.control?.finish();
+      plan.fit();
       manualPlace.replaceChildren();
       dock.sticks.focus({ preventScroll: true });
     }

@@ -129,6 +129,8 @@ export default {
   "report.silences": "Not heard",
   "report.for": "for {time} min",
   "report.to_the_end": "to the end",
+  "report.not_reached": "not reached",
+  "report.not_finished": "not finished",
   "report.at": "at {x} m, {y} m",
   "report.print": "Print",
 

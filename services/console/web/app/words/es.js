@@ -129,6 +129,8 @@ export default {
   "report.silences": "Sin noticias",
   "report.for": "durante {time} min",
   "report.to_the_end": "hasta el final",
+  "report.not_reached": "sin visitar",
+  "report.not_finished": "sin terminar",
   "report.at": "en {x} m; {y} m",
   "report.print": "Imprimir",
 

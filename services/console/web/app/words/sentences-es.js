@@ -102,6 +102,9 @@ export default [
   ["no place left that shows more of it", "no queda ningún punto que muestre más"],
   ["the drone is walled in", "el dron está encerrado"],
   ["passage {width} m < {needed} m", "paso de {width} m, hacen falta {needed} m"],
+  ["pilot refused: {why}", "el piloto lo rechaza: {why}"],
+  ["navigation refused: {why}", "la navegación lo rechaza: {why}"],
+  ["you do not hold the sticks", "usted no tiene los mandos"],
   ["navigation {what}", "navegación: {what}"],
   ["pilot {what}", "piloto: {what}"],
   // The console and the bridge.
