@@ -138,9 +138,9 @@ impl Hearing for Ear {
     }
 
     fn newest(&self, query: Query) {
-        let prefix = self.keys.telemetry("");
-        let key = query.key_expr().as_str().to_owned();
-        let topic = key.strip_prefix(&prefix).map(str::to_owned);
+        // Behind `sereno/<drone>/telemetry/`; the drone may be a wildcard, the topic may not.
+        let topic = query.key_expr().as_str().splitn(4, '/').nth(3).map(str::to_owned);
+        let key = self.keys.telemetry(topic.as_deref().unwrap_or_default());
         let asker = Asker { query, key };
         // A question that names no single topic is answered by nobody.
         match topic.filter(|topic| !topic.contains('*')) {

@@ -26,6 +26,7 @@ mod service;
 mod sessions;
 mod signals;
 mod taps;
+pub mod threads;
 pub mod x509;
 pub mod zenoh_config;
 

@@ -232,7 +232,7 @@ fn send(session: &zenoh::Session, put: &Put) {
         Pace::Large => Priority::DataLow,
         Pace::Reliable => Priority::InteractiveHigh,
     };
-    // Waiting for room ends within a second: then the connection of who does not read is closed.
+    // Waiting for room ends within half a second: then the connection of who does not read is closed.
     let congestion =
         if put.pace == Pace::Reliable { CongestionControl::Block } else { CongestionControl::Drop };
     // A session that has ended is replaced by its keeper.

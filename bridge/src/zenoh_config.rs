@@ -58,8 +58,8 @@ fn base(mode: &str, lease_ms: u32, max_message: u64, max_connections: u32) -> Va
                 "tx": {
                     "lease": lease_ms,
                     "keep_alive": 4,
-                    // Who does not read for a second is cut off, so that no answer waits for him.
-                    "queue": { "congestion_control": { "block": { "wait_before_close": 1_000_000 } } },
+                    // Who does not read for half a second is cut off, so that nothing waits for him.
+                    "queue": { "congestion_control": { "block": { "wait_before_close": 500_000 } } },
                 },
                 "rx": { "max_message_size": max_message },
             },

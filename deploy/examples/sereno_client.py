@@ -4,8 +4,12 @@ Needs `pip install -r requirements.txt` and a configuration that `sereno certs c
 """
 
 import json
+import os
 import secrets
 import threading
+
+# Before zenoh is imported: one thread for reading and writing TLS (https://github.com/eclipse-zenoh/zenoh/issues/2557).
+os.environ.setdefault("ZENOH_RUNTIME", "(rx: (handover: tx), tx: (worker_threads: 1))")
 
 import zenoh
 

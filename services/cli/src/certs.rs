@@ -144,7 +144,8 @@ pub(crate) fn run(place: &Place, certs: &Certs, json: bool) -> Result<ExitCode> 
         CertsOrder::Router { name, endpoints } => {
             let directory = authority.client(name, Standing::Router, endpoints, now)?;
             said.push(format!(
-                "{name} is a router: zenohd --config {}",
+                "{name} is a router: ZENOH_RUNTIME='{}' zenohd --config {}",
+                bridge::threads::ONE_THREAD,
                 directory.join(format!("{name}.json5")).display()
             ));
         }

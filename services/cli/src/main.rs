@@ -94,5 +94,6 @@ fn far(file: &std::path::Path, arguments: &Arguments) -> anyhow::Result<ExitCode
 }
 
 fn connect(file: &std::path::Path, arguments: &Arguments) -> anyhow::Result<bridge::remote::Remote> {
+    bridge::threads::ensure().map_err(anyhow::Error::msg)?;
     bridge::remote::Remote::connect(file, arguments.drone.as_deref()).map_err(anyhow::Error::msg)
 }

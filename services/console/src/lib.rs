@@ -23,6 +23,7 @@ mod socket;
 mod store;
 pub mod table;
 mod text;
+pub mod threads;
 mod tls;
 
 pub use app::{App, Clock, SystemClock};

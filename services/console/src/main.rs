@@ -43,6 +43,11 @@ fn arguments() -> Result<Option<Arguments>, String> {
 }
 
 fn main() -> ExitCode {
+    if let Err(sentence) = console::threads::ensure() {
+        // Nothing can be done when stderr is closed.
+        let _ = writeln!(std::io::stderr(), "sereno-console: {sentence}");
+        return ExitCode::FAILURE;
+    }
     // What zenoh says below a warning is not for who runs a console.
     tracing_subscriber::fmt()
         .with_max_level(tracing::Level::WARN)

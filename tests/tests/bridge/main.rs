@@ -198,7 +198,7 @@ fn strangers_get_nothing(system: &System) {
             stranger.keys.about(),
             stranger.keys.plan(),
             stranger.keys.telemetry("pilot/state"),
-            "@/**".to_owned(),
+            "sereno/**".to_owned(),
         ] {
             assert_eq!(stranger.ask(&key, None, SILENCE), None, "{what} asks {key}");
         }
