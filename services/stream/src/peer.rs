@@ -273,18 +273,24 @@ fn codec(mime: &str, fmtp: String, payload_type: u8) -> RTCRtpCodecParameters {
     }
 }
 
+/// The way that most was sent by: its name is `turn` when either end is a relay, and its protocol otherwise.
 fn path_in(report: &RTCStatsReport) -> Option<String> {
-    let chosen = report.transport().map(|transport| transport.selected_candidate_pair_id.clone())?;
-    let pair = report.candidate_pairs().find(|pair| pair.stats.id == chosen)?;
-    let side = |id: &str| match report.get(id) {
-        Some(
-            RTCStatsReportEntry::LocalCandidate(candidate) | RTCStatsReportEntry::RemoteCandidate(candidate),
-        ) => Some((candidate.candidate_type, candidate.protocol.to_lowercase())),
-        _ => None,
+    let pair =
+        report.candidate_pairs().max_by_key(|pair| (pair.nominated, pair.bytes_sent, pair.packets_sent))?;
+    let side = |id: &str| {
+        report.iter().find_map(|entry| match entry {
+            RTCStatsReportEntry::LocalCandidate(candidate)
+            | RTCStatsReportEntry::RemoteCandidate(candidate)
+                if candidate.stats.id.ends_with(id) =>
+            {
+                Some((candidate.candidate_type, candidate.protocol.to_lowercase()))
+            }
+            _ => None,
+        })
     };
     let sides = [side(&pair.local_candidate_id), side(&pair.remote_candidate_id)];
     if sides.iter().flatten().any(|(kind, _)| *kind == RTCIceCandidateType::Relay) {
         return Some("turn".to_owned());
     }
-    sides.into_iter().flatten().next().map(|(_, protocol)| protocol)
+    sides.into_iter().flatten().map(|(_, protocol)| protocol).find(|protocol| !protocol.is_empty())
 }

@@ -64,6 +64,7 @@ subscribes.'pilot/state' = { depth = 4 }
 [service.absent]
 run = "absent"
 criticality = "comfort"
+tick_hz = 1
 publishes.'sim/ping' = { hz = 0 }
 publishes.'flight/state' = { hz = 0 }
 publishes.'pilot/state' = { hz = 0 }
@@ -76,31 +77,26 @@ const RUNNING: [&str; 4] = ["simulator", "scenery", "camera", "stream"];
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// What a browser saw.
-pub struct Watched(pub Value);
+pub(crate) struct Watched(pub(crate) Value);
 
 impl Watched {
-    pub fn numbers(&self, key: &str) -> Vec<f64> {
+    pub(crate) fn numbers(&self, key: &str) -> Vec<f64> {
         self.0[key].as_array().map(|all| all.iter().filter_map(Value::as_f64).collect()).unwrap_or_default()
     }
-    pub fn errors(&self) -> Vec<String> {
-        self.numbers("errors")
-            .iter()
-            .map(f64::to_string)
-            .chain(self.0["errors"].as_array().into_iter().flatten().map(ToString::to_string))
-            .collect()
+    pub(crate) fn errors(&self) -> Vec<String> {
+        self.0["errors"].as_array().into_iter().flatten().map(ToString::to_string).collect()
     }
 }
 
 /// The value below which `share` of them lie; not a number without any.
-pub fn quantile(values: &[f64], share: f64) -> f64 {
+pub(crate) fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let index = ((sorted.len() as f64 - 1.0) * share).round().max(0.0) as usize;
     sorted.get(index).copied().unwrap_or(f64::NAN)
 }
 
-pub struct Drone {
-    directory: tempfile::TempDir,
+pub(crate) struct Drone {
     run_dir: RunDir,
     manifest_file: PathBuf,
     running: Vec<(&'static str, Child)>,
@@ -111,6 +107,8 @@ pub struct Drone {
     videos: Input<Video>,
     kill: Option<(&'static str, f64)>,
     incarnation: u32,
+    /// Removed last.
+    _directory: tempfile::TempDir,
 }
 
 fn programs() -> PathBuf {
@@ -120,7 +118,7 @@ fn programs() -> PathBuf {
 
 impl Drone {
     /// Starts everything; `stream` is written into the stream's configuration.
-    pub fn start(stream: &str) -> Self {
+    pub(crate) fn start(stream: &str) -> Self {
         let directory = tempfile::tempdir().unwrap();
         let deploy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy");
         for folder in ["plans", "vehicles", "worlds"] {
@@ -144,7 +142,7 @@ impl Drone {
             (tool.ports.output().unwrap(), tool.ports.input().unwrap(), tool.ports.input().unwrap());
         let manifest_file = directory.path().join("filmed.toml");
         let mut drone = Self {
-            directory,
+            _directory: directory,
             run_dir,
             manifest_file,
             running: Vec::new(),
@@ -175,12 +173,12 @@ impl Drone {
     }
 
     /// Kills a service so many seconds after the first picture of the next [`Drone::watch`], and starts it again.
-    pub fn kill_during(&mut self, service: &'static str, after_s: f64) {
+    pub(crate) fn kill_during(&mut self, service: &'static str, after_s: f64) {
         self.kill = Some((service, after_s));
     }
 
     /// Has a browser watch with these options of the page.
-    pub fn watch(&mut self, options: &str) -> Watched {
+    pub(crate) fn watch(&mut self, options: &str) -> Watched {
         let server = Server::start();
         let profile = tempfile::tempdir().unwrap();
         let mut browser = Command::new("chromium")
@@ -258,7 +256,7 @@ impl Drone {
     }
 
     /// Asserts that within two seconds nothing is encoded any more, as nobody watches.
-    pub fn stays_quiet(&mut self) {
+    pub(crate) fn stays_quiet(&mut self) {
         let wait = |drone: &mut Self, seconds: u64| {
             let until = Instant::now() + Duration::from_secs(seconds);
             let mut videos = 0;
@@ -282,11 +280,7 @@ impl Drop for Drone {
             let _ = child.kill();
             let _ = child.wait();
         }
-        let _ = self.run_dir.leftovers();
-        let _ = self.directory.path();
-        for name in self.run_dir.leftovers() {
-            let _ = std::fs::remove_file(Path::new("/dev/shm").join(name));
-        }
+        self.holder.cleanup_dead_nodes();
     }
 }
 
