@@ -174,9 +174,9 @@ fn normal(corners: &[[f32; 3]]) -> [f32; 3] {
     let mut sum = [0.0f32; 3];
     for (k, a) in corners.iter().enumerate() {
         let b = corners[(k + 1) % corners.len()];
-        for axis in 0..3 {
+        for (axis, total) in sum.iter_mut().enumerate() {
             let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
-            sum[axis] += (a[i] - b[i]) * (a[j] + b[j]);
+            *total += (a[i] - b[i]) * (a[j] + b[j]);
         }
     }
     let length = super::look::dot(sum, sum).sqrt().max(1e-12);
