@@ -91,19 +91,25 @@ fn what_is_wrong_is_named_with_file_and_field() {
         (
             "another's key",
             0,
-            |own, other| drop(fs::copy(other.join("sereno-1.key"), own.join("sereno-1.key")).unwrap()),
+            |own, other| {
+                fs::copy(other.join("sereno-1.key"), own.join("sereno-1.key")).unwrap();
+            },
             "sereno-1.key: the key belongs to another certificate",
         ),
         (
             "another authority",
             0,
-            |own, other| drop(fs::copy(other.join("ca.pem"), own.join("ca.pem")).unwrap()),
+            |own, other| {
+                fs::copy(other.join("ca.pem"), own.join("ca.pem")).unwrap();
+            },
             "sereno-1.pem: issuer: the authority in ca.pem has not signed this certificate",
         ),
         (
             "another name",
             0,
-            |own, _| drop(fs::copy(own.join("https.pem"), own.join("sereno-1.pem")).unwrap()),
+            |own, _| {
+                fs::copy(own.join("https.pem"), own.join("sereno-1.pem")).unwrap();
+            },
             "sereno-1.pem: common name = Sereno console: must be sereno-1",
         ),
         (

@@ -27,8 +27,18 @@ fn house() -> BTreeMap<String, (String, BTreeSet<String>)> {
 
 const LIBRARIES: [&str; 8] =
     ["floorplan", "mcl", "avoid", "patrol", "control", "msp", "manifest", "airframe"];
-const SERVICES: [&str; 10] =
-    ["sonar", "flow", "flight", "localization", "navigation", "pilot", "simulator", "camera", "console", "stream"];
+const SERVICES: [&str; 10] = [
+    "sonar",
+    "flow",
+    "flight",
+    "localization",
+    "navigation",
+    "pilot",
+    "simulator",
+    "camera",
+    "console",
+    "stream",
+];
 /// Who speaks to what is off the board.
 const ZENOH: [&str; 4] = ["bridge", "console", "cli", "sereno-tests"];
 /// Who has an async runtime of its own.

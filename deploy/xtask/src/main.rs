@@ -117,7 +117,7 @@ const PROGRAMS: [&str; 10] = [
     "sereno-bridge",
 ];
 /// Those that only show it.
-const WATCHERS: [&str; 2] = ["sereno-console", "sereno-camera"];
+const WATCHERS: [&str; 4] = ["sereno-console", "sereno-camera", "sereno-scenery", "sereno-stream"];
 
 fn build_arguments(programs: &[&'static str]) -> Vec<&'static str> {
     // With the features that the whole workspace wants: whatever is chosen, no crate is built twice.

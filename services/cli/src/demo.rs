@@ -176,7 +176,9 @@ pub(crate) fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
 /// The round is over, and the drone is the guard's until Ctrl-C.
 fn stay(room: &mut Room, system: &mut System, stop: &Interrupt, json: bool) {
     if !json {
-        println!("\nThe drone is yours now, from the page or by `sereno`; Ctrl-C lands it and ends the demo.");
+        println!(
+            "\nThe drone is yours now, from the page or by `sereno`; Ctrl-C lands it and ends the demo."
+        );
     }
     while !stop.came() && matches!(system.0.try_wait(), Ok(None)) {
         tell(room, json);

@@ -8,8 +8,8 @@ mod demo;
 mod kills;
 mod operate;
 mod rehearse;
-mod room;
 mod remote;
+mod room;
 mod schema;
 mod system;
 mod topic;
@@ -38,7 +38,9 @@ fn main() -> ExitCode {
         Verb::Takeoff => operate::give(place, operate::Order::TakeOff, json),
         Verb::Land => operate::give(place, operate::Order::Land, json),
         Verb::Home => operate::give(place, operate::Order::Home, json),
-        Verb::Goto { x, y } => operate::Order::goto(*x, *y).and_then(|order| operate::give(place, order, json)),
+        Verb::Goto { x, y } => {
+            operate::Order::goto(*x, *y).and_then(|order| operate::give(place, order, json))
+        }
         Verb::Patrol { order } => operate::give(place, (*order).into(), json),
         Verb::Stop => operate::give(place, operate::Order::Stop, json),
         Verb::Cut { yes_it_falls } => {

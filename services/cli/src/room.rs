@@ -5,6 +5,7 @@ use bridge::Authority;
 use cli::place::Place;
 use std::io::{BufRead, BufReader};
 use std::net::{Ipv4Addr, TcpListener};
+use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
@@ -67,7 +68,12 @@ pub(crate) struct Room {
 impl Room {
     /// Prepares the certificates and overlays of so many drones.
     pub(crate) fn prepare(place: &Place, directory: PathBuf, drones: usize) -> Result<Self> {
-        std::fs::create_dir_all(&directory).with_context(|| format!("cannot make {}", directory.display()))?;
+        // Certificates' keys and accounts are nobody else's.
+        std::fs::DirBuilder::new()
+            .recursive(true)
+            .mode(0o700)
+            .create(&directory)
+            .with_context(|| format!("cannot make {}", directory.display()))?;
         let directory = std::path::absolute(directory)?;
         let first = place.manifest(true)?.0.system.name;
         let stem = first.strip_suffix("-1").unwrap_or(&first).to_owned();
@@ -97,7 +103,12 @@ impl Room {
         let authority = certificates(&certs, &names, &endpoints)?;
         // Where the drones are may have changed since the last demo.
         let now_s = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs().cast_signed();
-        authority.client("console", bridge::roles::Standing::Client(bridge::roles::Role::Administrator), &endpoints, now_s)?;
+        authority.client(
+            "console",
+            bridge::roles::Standing::Client(bridge::roles::Role::Administrator),
+            &endpoints,
+            now_s,
+        )?;
         Ok(Self { directory, berths, console: None, said: None, again: Instant::now() })
     }
 

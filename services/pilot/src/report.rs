@@ -2,9 +2,7 @@
 
 use crate::core::PilotCore;
 use control::{Action, Cause, Hand, Loss, stick};
-use ipc_types::{
-    Channels, FailsafeAction, FailsafeCause, Phase, PilotState, SticksState, Text, nanoseconds,
-};
+use ipc_types::{Channels, FailsafeAction, FailsafeCause, Phase, PilotState, SticksState, Text, nanoseconds};
 
 /// Channels that are filled: four sticks, AUX1 (arm), AUX2 (angle).
 const CHANNELS: usize = 6;

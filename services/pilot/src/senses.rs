@@ -2,8 +2,8 @@
 
 use control::{Axes, GRAVITY_M_S2, StickInput, Tilt, Vector, wrap_angle};
 use ipc_types::{
-    ArmSwitch, Attitude, FlightState, Ladder, LinkState, HEADING_HOLD, HEIGHT_HOLD, LocalizationState, Pose, Power, Setpoint,
-    SetpointKind, Sticks, Text, nanoseconds, seconds_between,
+    ArmSwitch, Attitude, FlightState, HEADING_HOLD, HEIGHT_HOLD, Ladder, LinkState, LocalizationState, Pose,
+    Power, Setpoint, SetpointKind, Sticks, Text, nanoseconds, seconds_between,
 };
 
 /// Seconds from a stamp to now; infinite without one.

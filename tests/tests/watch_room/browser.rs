@@ -67,7 +67,8 @@ impl Guard {
 
     /// What an expression comes to; `Null` when it throws.
     pub async fn look(&self, expression: &str) -> serde_json::Value {
-        let wrapped = format!("(() => {{ try {{ return ({expression}) ?? null; }} catch {{ return null; }} }})()");
+        let wrapped =
+            format!("(() => {{ try {{ return ({expression}) ?? null; }} catch {{ return null; }} }})()");
         match self.page.evaluate(wrapped).await {
             Ok(found) => found.value().cloned().unwrap_or_default(),
             Err(_) => serde_json::Value::Null,
@@ -100,7 +101,12 @@ impl Guard {
         let found = format!(
             "[...document.querySelectorAll('button, a')].find((b) => b.innerText.trim() === {words:?} && b.getClientRects().length > 0)"
         );
-        self.until(&format!("{words:?} can be pressed"), &format!("!{found}.disabled"), Duration::from_secs(30)).await;
+        self.until(
+            &format!("{words:?} can be pressed"),
+            &format!("!{found}.disabled"),
+            Duration::from_secs(30),
+        )
+        .await;
         self.look(&format!("{found}.click()")).await;
     }
 

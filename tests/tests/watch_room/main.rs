@@ -120,7 +120,9 @@ async fn a_guard_claims_watches_orders_takes_over_and_reads_the_report() {
     guard.press_words("Land").await;
     tokio::task::block_in_place(|| drone.wait_phase(Phase::Grounded));
     guard.look("location.hash = '#/reports'").await;
-    guard.until("a report is listed", "document.querySelector('#view a[href^=\"#/reports/\"]') !== null", LONG).await;
+    guard
+        .until("a report is listed", "document.querySelector('#view a[href^=\"#/reports/\"]') !== null", LONG)
+        .await;
     guard.look("document.querySelector('#view a[href^=\"#/reports/\"]').click()").await;
     guard.until("the report is read", "document.querySelector('#view').innerText.includes('%')", LONG).await;
     guard.picture("report").await;

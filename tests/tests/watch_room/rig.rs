@@ -40,10 +40,13 @@ impl Rig {
         let deploy = lightly_cluttered(directory.path(), "two-rooms").unwrap();
         let run_dir = directory.path().join("run");
         let up = sereno(&deploy, &run_dir, &["up", "--sim", "--quiet"]).stdin(Stdio::null()).spawn().unwrap();
-        let mut rig = Self { directory, deploy, up, console: None, address: String::new(), claim: String::new() };
+        let mut rig =
+            Self { directory, deploy, up, console: None, address: String::new(), claim: String::new() };
         wait_until("everything runs", || {
             let rows = supervisor::Client::connect(&rig.run_dir()).and_then(|mut client| client.ps());
-            rows.is_ok_and(|all| !all.services.is_empty() && all.services.iter().all(|row| row.state == "running"))
+            rows.is_ok_and(|all| {
+                !all.services.is_empty() && all.services.iter().all(|row| row.state == "running")
+            })
         });
         rig.open();
         rig

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use zenoh::qos::{CongestionControl, Priority};
 
-/// After this nobody waits for the drone's answer any more: an order itself lives two seconds.
-const PATIENCE: Duration = Duration::from_millis(4500);
+/// After this nobody waits for the drone's answer any more: working out a route takes it ten seconds at most.
+const PATIENCE: Duration = Duration::from_millis(10_500);
 /// A drone that has just been found gives its first beacon within this time: they come 20 a second.
 const FIRST_BEACON: Duration = Duration::from_millis(500);
 /// Longest sentence that is taken from a drone, bytes.
