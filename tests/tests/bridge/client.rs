@@ -101,8 +101,14 @@ impl Client {
     /// Whether a message of a key comes in time.
     pub(crate) fn hears(&self, key: &str, patience: Duration) -> bool {
         let (heard, came) = mpsc::sync_channel(1);
-        let subscriber =
-            self.session.declare_subscriber(key).callback(move |_| drop(heard.try_send(()))).wait().unwrap();
+        let subscriber = self
+            .session
+            .declare_subscriber(key)
+            .callback(move |_| {
+                let _ = heard.try_send(());
+            })
+            .wait()
+            .unwrap();
         let came = came.recv_timeout(patience).is_ok();
         subscriber.undeclare().wait().unwrap();
         came

@@ -23,7 +23,7 @@ navigator.getGamepads = () => [{
 "#;
 
 /// One page in one browser.
-pub struct Guard {
+pub(crate) struct Guard {
     browser: Browser,
     page: Page,
     _profile: tempfile::TempDir,
@@ -31,7 +31,7 @@ pub struct Guard {
 
 impl Guard {
     /// Opens `address` in a fresh profile.
-    pub async fn open(address: &str) -> Self {
+    pub(crate) async fn open(address: &str) -> Self {
         let profile = tempfile::tempdir().unwrap();
         let config = BrowserConfig::builder()
             .no_sandbox()
@@ -60,13 +60,13 @@ impl Guard {
     }
 
     /// The window's size, in the page's own pixels.
-    pub async fn size(&self, width: i64, height: i64) {
+    pub(crate) async fn size(&self, width: i64, height: i64) {
         let metrics = SetDeviceMetricsOverrideParams::new(width, height, 1.0, width < 600);
         self.page.execute(metrics).await.unwrap();
     }
 
     /// What an expression comes to; `Null` when it throws.
-    pub async fn look(&self, expression: &str) -> serde_json::Value {
+    pub(crate) async fn look(&self, expression: &str) -> serde_json::Value {
         let wrapped =
             format!("(() => {{ try {{ return ({expression}) ?? null; }} catch {{ return null; }} }})()");
         match self.page.evaluate(wrapped).await {
@@ -76,7 +76,7 @@ impl Guard {
     }
 
     /// Waits until an expression is true, or says what the page shows instead.
-    pub async fn until(&self, what: &str, expression: &str, patience: Duration) {
+    pub(crate) async fn until(&self, what: &str, expression: &str, patience: Duration) {
         let began = Instant::now();
         while self.look(expression).await != serde_json::Value::Bool(true) {
             if began.elapsed() > patience {
@@ -89,7 +89,7 @@ impl Guard {
     }
 
     /// Presses the button that a selector names, as a hand does: only one that is there, enabled and seen.
-    pub async fn press(&self, selector: &str) {
+    pub(crate) async fn press(&self, selector: &str) {
         let found = format!("document.querySelector({selector:?})");
         let ready = format!("!{found}.disabled && {found}.getClientRects().length > 0");
         self.until(&format!("{selector} can be pressed"), &ready, Duration::from_secs(30)).await;
@@ -97,7 +97,7 @@ impl Guard {
     }
 
     /// Presses the button that bears these words.
-    pub async fn press_words(&self, words: &str) {
+    pub(crate) async fn press_words(&self, words: &str) {
         let found = format!(
             "[...document.querySelectorAll('button, a')].find((b) => b.innerText.trim() === {words:?} && b.getClientRects().length > 0)"
         );
@@ -111,14 +111,14 @@ impl Guard {
     }
 
     /// Fills the field of a form.
-    pub async fn fill(&self, name: &str, text: &str) {
+    pub(crate) async fn fill(&self, name: &str, text: &str) {
         let there = format!("document.querySelector('input[name={name}]') !== null");
         self.until(name, &there, Duration::from_secs(30)).await;
         self.look(&format!("document.querySelector('input[name={name}]').value = {text:?}")).await;
     }
 
     /// Keeps what is seen, for people to look at.
-    pub async fn picture(&self, name: &str) {
+    pub(crate) async fn picture(&self, name: &str) {
         let place: PathBuf = programs().with_file_name("screenshots");
         std::fs::create_dir_all(&place).unwrap();
         let parameters = ScreenshotParams::builder().format(CaptureScreenshotFormat::Png).build();
@@ -126,12 +126,12 @@ impl Guard {
     }
 
     /// Dies as a browser that is killed: nothing is said to anybody.
-    pub async fn kill(mut self) {
+    pub(crate) async fn kill(mut self) {
         let _ = self.browser.kill().await;
     }
 
     /// Closes the browser.
-    pub async fn close(mut self) {
+    pub(crate) async fn close(mut self) {
         let _ = self.browser.close().await;
         let _ = self.browser.wait().await;
     }

@@ -10,10 +10,10 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Whoever waits this long waits in vain, on a loaded machine too.
-pub const LONG: Duration = Duration::from_secs(90);
+pub(crate) const LONG: Duration = Duration::from_secs(90);
 
 /// Waits for a condition; says what for when it does not come.
-pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+pub(crate) fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     let began = Instant::now();
     while !holds() {
         assert!(began.elapsed() < LONG, "{what}: not within {} s", LONG.as_secs());
@@ -22,20 +22,20 @@ pub fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
 }
 
 /// A supervised system in the simulator with a console on it.
-pub struct Rig {
+pub(crate) struct Rig {
     directory: tempfile::TempDir,
     deploy: PathBuf,
     up: Child,
     console: Option<Child>,
     /// Where the page is.
-    pub address: String,
+    pub(crate) address: String,
     /// What claims it.
-    pub claim: String,
+    pub(crate) claim: String,
 }
 
 impl Rig {
     /// Everything but a browser.
-    pub fn start() -> Self {
+    pub(crate) fn start() -> Self {
         let directory = tempfile::tempdir().unwrap();
         let deploy = lightly_cluttered(directory.path(), "two-rooms").unwrap();
         let run_dir = directory.path().join("run");
@@ -77,12 +77,12 @@ impl Rig {
     }
 
     /// Where the supervisor keeps its things.
-    pub fn run_dir(&self) -> PathBuf {
+    pub(crate) fn run_dir(&self) -> PathBuf {
         self.directory.path().join("run")
     }
 
     /// The running system, for who reads its topics.
-    pub fn manifest(&self) -> (Manifest, RunDir) {
+    pub(crate) fn manifest(&self) -> (Manifest, RunDir) {
         let place = Place { deploy: Some(self.deploy.clone()), run_dir: Some(self.run_dir()) };
         let (manifest, _, run_dir) = place.running().unwrap();
         (manifest, run_dir)
