@@ -255,7 +255,10 @@ fn bad_input_changes_nothing(system: &System) {
             let answer = answer.unwrap_or_else(|| panic!("{verb}, {what}: no answer"));
             let text = answer["text"].as_str().unwrap();
             assert!(answer["accepted"] == false && !text.is_empty(), "{verb}, {what}: {answer}");
-            assert!(!text.contains("not so fast"), "{verb}, {what}: refused for its pace, not for what it is");
+            assert!(
+                !text.contains("not so fast"),
+                "{verb}, {what}: refused for its pace, not for what it is"
+            );
         }
     }
     std::thread::sleep(Duration::from_millis(600));
