@@ -41,6 +41,14 @@ impl Witness {
         (Phase::from_code(self.pilot.phase), SticksState::from_code(self.pilot.sticks))
     }
 
+    fn look_yaw(&mut self) -> f32 {
+        wait_until("the truth is told", || {
+            self.look();
+            self.at.header.sequence > 0
+        });
+        self.at.yaw_rad
+    }
+
     fn wait_phase(&mut self, phase: Phase) {
         wait_until(&format!("the pilot is in phase {phase}"), || self.look().0 == Some(phase));
     }
@@ -51,6 +59,38 @@ impl Witness {
 
     fn speed(&self) -> f32 {
         self.at.velocity_x_m_s.hypot(self.at.velocity_y_m_s)
+    }
+}
+
+/// Takes the sticks and holds the button, as a patient human does: on a loaded machine the page may be silent for a moment, and
+/// then the drone wants the sticks let go once more, or taken again. Until `holds` is true while the drone follows.
+async fn fly_by_hand(
+    guard: &Guard,
+    drone: &mut Witness,
+    axes: &str,
+    mut holds: impl FnMut(&Witness) -> bool,
+) {
+    let began = Instant::now();
+    loop {
+        let (_, sticks) = drone.look();
+        match sticks {
+            Some(SticksState::Free) => {
+                guard.look("(sereno.hold = false, sereno.axes = [0, 0, 0, 0])").await;
+                let take = "document.querySelector('.sticks-take')";
+                guard.look(&format!("!{take}.disabled && {take}.click()")).await;
+            }
+            Some(SticksState::Following) => {
+                guard.look(&format!("sereno.axes = {axes}")).await;
+                if holds(drone) {
+                    return;
+                }
+            }
+            _ => {
+                guard.look("(sereno.hold = true, sereno.axes = [0, 0, 0, 0])").await;
+            }
+        }
+        assert!(began.elapsed() < LONG, "by hand: the sticks are {sticks:?}");
+        tokio::time::sleep(Duration::from_millis(30)).await;
     }
 }
 
@@ -82,26 +122,17 @@ async fn a_guard_claims_watches_orders_takes_over_and_reads_the_report() {
 
     // Taking over: it stops, the sticks are in the middle, it follows while the button is held.
     guard.press_words("Sticks").await;
-    guard.press(".sticks-take").await;
-    tokio::task::block_in_place(|| {
-        drone.wait_phase(Phase::Manual);
-        drone.wait_sticks(SticksState::Ready);
-    });
-    guard.look("sereno.hold = true").await;
-    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Following));
-    guard.picture("by-hand").await;
+    let before = drone.look_yaw();
     // Turning is free wherever it stands.
-    guard.look("sereno.axes = [0.8, 0, 0, 0]").await;
-    let before = drone.at.yaw_rad;
-    tokio::task::block_in_place(|| {
-        wait_until("it turns by hand", || {
-            drone.look();
-            (drone.at.yaw_rad - before).sin().abs() > 0.3
-        });
-    });
+    fly_by_hand(&guard, &mut drone, "[0.8, 0, 0, 0]", |drone| (drone.at.yaw_rad - before).sin().abs() > 0.3)
+        .await;
+    assert_eq!(drone.look().0, Some(Phase::Manual));
+    guard.picture("by-hand").await;
     // Frozen: the pad still says the same, and nothing new comes of it.
     guard.look("sereno.alive = false").await;
-    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Silent));
+    tokio::task::block_in_place(|| {
+        wait_until("it follows no more", || drone.look().1 != Some(SticksState::Following));
+    });
     guard.look("(sereno.alive = true, sereno.axes = [0, 0, 0, 0])").await;
     tokio::task::block_in_place(|| {
         wait_until("it hovers", || {
@@ -110,10 +141,8 @@ async fn a_guard_claims_watches_orders_takes_over_and_reads_the_report() {
         });
     });
     guard.look("sereno.hold = false").await;
-    let holds = drone.pilot.lease != 0;
-    if holds {
-        guard.press(".sticks-release").await;
-    }
+    // The silence may have lasted for the second that ends a lease.
+    guard.look("document.querySelector('.sticks-release').click()").await;
     tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Free));
     assert_eq!(drone.look().0, Some(Phase::Hover), "nothing resumes by itself");
 
@@ -140,13 +169,13 @@ async fn a_browser_that_dies_lets_the_drone_hover_and_holds_nothing() {
     guard.press(".dock-primary").await;
     tokio::task::block_in_place(|| drone.wait_phase(Phase::Autonomous));
     guard.press_words("Sticks").await;
-    guard.press(".sticks-take").await;
-    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Ready));
-    guard.look("sereno.hold = true").await;
-    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Following));
+    fly_by_hand(&guard, &mut drone, "[0, 0, 0, 0]", |_| true).await;
     let died = Instant::now();
     guard.kill().await;
-    tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Silent));
+    // The state may be passed between two looks: at the latest it ends the lease.
+    tokio::task::block_in_place(|| {
+        wait_until("it follows no more", || drone.look().1 != Some(SticksState::Following));
+    });
     let silent = died.elapsed();
     tokio::task::block_in_place(|| drone.wait_sticks(SticksState::Free));
     let free = died.elapsed();
