@@ -35,7 +35,7 @@ pub struct Heard {
     pub is_json: bool,
 }
 
-fn said(error: zenoh::Error) -> String {
+fn said(error: &zenoh::Error) -> String {
     let text = error.to_string();
     manifest::one_line(text.split(" at ").next().unwrap_or(&text))
 }
@@ -49,7 +49,7 @@ impl Remote {
         crate::files::check_private(file)?;
         let text = crate::files::read_text(file)?;
         let name = file.display();
-        let config = Config::from_json5(&text).map_err(|error| format!("{name}: {}", said(error)))?;
+        let config = Config::from_json5(&text).map_err(|error| format!("{name}: {}", said(&error)))?;
         let metadata: Value = config
             .get_json("metadata")
             .ok()
@@ -62,7 +62,7 @@ impl Remote {
             })?
             .to_owned();
         let session = zenoh::open(config).wait().map_err(|error| {
-            format!("cannot connect as {certificate}: {} (is the drone on, and does its certificate name this address?)", said(error))
+            format!("cannot connect as {certificate}: {} (is the drone on, and does its certificate name this address?)", said(&error))
         })?;
         let known: Vec<&str> =
             metadata["drones"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
@@ -114,7 +114,7 @@ impl Remote {
         if let Some(payload) = payload {
             question = question.payload(payload);
         }
-        let replies = question.wait().map_err(said)?;
+        let replies = question.wait().map_err(|error| said(&error))?;
         while let Ok(reply) = replies.recv() {
             if let Ok(sample) = reply.result() {
                 return Ok(sample.payload().to_bytes().into_owned());
@@ -173,7 +173,7 @@ impl Remote {
                 let _ = heard.try_send(Heard { payload: sample.payload().to_bytes().into_owned(), is_json });
             })
             .wait()
-            .map_err(said)?;
+            .map_err(|error| said(&error))?;
         Ok(Followed { messages, _subscriber: subscriber })
     }
 }
@@ -201,7 +201,7 @@ fn alive(session: &Session) -> Result<Vec<String>, String> {
         .with(FifoChannel::new(64))
         .timeout(PATIENCE)
         .wait()
-        .map_err(said)?;
+        .map_err(|error| said(&error))?;
     let mut drones = Vec::new();
     while let Ok(reply) = replies.recv() {
         if let Ok(sample) = reply.result()

@@ -84,7 +84,7 @@ fn what_is_wrong_is_named_with_file_and_field() {
             "readable",
             0,
             |own, _| {
-                fs::set_permissions(own.join("sereno-1.key"), fs::Permissions::from_mode(0o644)).unwrap()
+                fs::set_permissions(own.join("sereno-1.key"), fs::Permissions::from_mode(0o644)).unwrap();
             },
             "sereno-1.key: mode 644: a private key must be readable by its owner alone",
         ),

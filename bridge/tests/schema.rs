@@ -3,7 +3,7 @@
 
 use bridge::form::encode;
 use bridge::schema::topics;
-use ipc_types::{Field, Message, TopicVisitor, visit_all};
+use ipc_types::{Message, TopicVisitor, visit_all};
 use serde_json::Value;
 use std::path::Path;
 

@@ -54,7 +54,9 @@ fn own_certificates(place: &Place) -> Result<()> {
     if bridge::Authority::at(&directory).exists() {
         return Ok(());
     }
-    if let Err(error) = crate::room::certificates(&directory, &[manifest.system.name.clone()], &[endpoint]) {
+    if let Err(error) =
+        crate::room::certificates(&directory, std::slice::from_ref(&manifest.system.name), &[endpoint])
+    {
         // It flies without anybody who watches from elsewhere.
         eprintln!("no certificates, so the bridge will not start: {error:#}");
     }

@@ -269,7 +269,6 @@ fn codec(mime: &str, fmtp: String, payload_type: u8) -> RTCRtpCodecParameters {
             },
         },
         payload_type,
-        ..Default::default()
     }
 }
 

@@ -2,7 +2,7 @@
 //! code in the picture read back where it is shown.
 //!
 //! Needs the programs of a release build (`cargo build --release -p simulator -p camera -p stream`) and `chromium`.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "tests")]
 
 mod drone;
 

@@ -1,5 +1,5 @@
 //! The bridge over real TLS, as a process of a flying system: who may what, what nobody may, and how quick it is.
-#![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "tests")]
 
 mod client;
 mod system;

@@ -1,6 +1,6 @@
 //! The watch room as a guard has it: a real browser on the page of a real console, on a system of processes that flies in the
 //! simulator. Screenshots are left in `target/screenshots`.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "tests")]
 
 mod browser;
 mod rig;

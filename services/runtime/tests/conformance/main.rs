@@ -163,6 +163,9 @@ impl ipc_types::Field for OldPose {
     fn write_json(&self, _: &mut dyn std::fmt::Write) -> std::fmt::Result {
         Ok(())
     }
+    fn write_schema(out: &mut dyn std::fmt::Write) -> std::fmt::Result {
+        Pose::write_schema(out)
+    }
 }
 impl ipc_types::Message for OldPose {
     const TOPIC: &'static str = "localization/pose";
