@@ -18,6 +18,8 @@ struct Board {
     commands: Input<Command>,
     sticks: Input<Sticks>,
     pilot: Input<PilotState>,
+    /// What was given before is history, which reaches who joins late within a second.
+    since_ns: u64,
 }
 
 impl Board {
@@ -25,12 +27,13 @@ impl Board {
         let mut tool = system.tool();
         let (commands, sticks, pilot) =
             (tool.ports.input().unwrap(), tool.ports.input().unwrap(), tool.ports.input().unwrap());
-        let mut board = Self { tool, commands, sticks, pilot };
+        let mut board = Self { tool, commands, sticks, pilot, since_ns: runtime::monotonic_ns() };
         board.forget();
         board
     }
 
     fn forget(&mut self) {
+        self.since_ns = runtime::monotonic_ns();
         while self.commands.receive().is_some() || self.sticks.receive().is_some() {}
     }
 
@@ -39,9 +42,15 @@ impl Board {
         self.tool.tick();
         let mut heard = Vec::new();
         while let Some(command) = self.commands.receive() {
+            if command.header.stamp_ns < self.since_ns {
+                continue;
+            }
             heard.push(format!("order {} by {}", command.verb, command.certificate));
         }
         while let Some(sticks) = self.sticks.receive() {
+            if sticks.header.stamp_ns < self.since_ns {
+                continue;
+            }
             heard.push(format!("sticks under lease {}", sticks.lease));
         }
         heard

@@ -94,6 +94,32 @@ async fn fly_by_hand(
     }
 }
 
+/// Starts the round by the page's one button for it, again while the controller has not got through its boot (5 s, FACTS 1).
+async fn start_round(guard: &Guard, drone: &mut Witness) {
+    let began = Instant::now();
+    loop {
+        match drone.look().0 {
+            Some(Phase::Autonomous) => return,
+            Some(Phase::Grounded) => {
+                let button = "document.querySelector('.dock-primary')";
+                guard
+                    .look(&format!(
+                        "!{button}.disabled && {button}.innerText.includes('Start round') && {button}.click()"
+                    ))
+                    .await;
+                tokio::time::sleep(Duration::from_secs(1)).await;
+            }
+            _ => {}
+        }
+        assert!(
+            began.elapsed() < LONG,
+            "the round does not start: {}",
+            guard.look("document.body.innerText").await
+        );
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
 async fn claim(guard: &Guard, rig: &Rig) {
     guard.fill("code", &rig.claim).await;
     guard.fill("name", "Ana").await;
@@ -111,9 +137,7 @@ async fn a_guard_claims_watches_orders_takes_over_and_reads_the_report() {
     let mut drone = Witness::open(&rig);
     let guard = Guard::open(&rig.address).await;
     claim(&guard, &rig).await;
-    // The round, by the page's one button for it.
-    guard.press(".dock-primary").await;
-    tokio::task::block_in_place(|| drone.wait_phase(Phase::Autonomous));
+    start_round(&guard, &mut drone).await;
     guard.until("the page says that it flies", "document.body.innerText.includes('Flying')", LONG).await;
     guard.picture("round-desk").await;
     guard.size(390, 844).await;
@@ -166,8 +190,7 @@ async fn a_browser_that_dies_lets_the_drone_hover_and_holds_nothing() {
     let mut drone = Witness::open(&rig);
     let guard = Guard::open(&rig.address).await;
     claim(&guard, &rig).await;
-    guard.press(".dock-primary").await;
-    tokio::task::block_in_place(|| drone.wait_phase(Phase::Autonomous));
+    start_round(&guard, &mut drone).await;
     guard.press_words("Sticks").await;
     fly_by_hand(&guard, &mut drone, "[0, 0, 0, 0]", |_| true).await;
     let died = Instant::now();

@@ -7,6 +7,7 @@ use sereno_tests::{lightly_cluttered, programs};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Whoever waits this long waits in vain, on a loaded machine too.
@@ -21,6 +22,9 @@ pub(crate) fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     }
 }
 
+/// One system and one browser at a time: two cores fly one.
+static TURN: Mutex<()> = Mutex::new(());
+
 /// A supervised system in the simulator with a console on it.
 pub(crate) struct Rig {
     directory: tempfile::TempDir,
@@ -31,17 +35,26 @@ pub(crate) struct Rig {
     pub(crate) address: String,
     /// What claims it.
     pub(crate) claim: String,
+    _turn: MutexGuard<'static, ()>,
 }
 
 impl Rig {
     /// Everything but a browser.
     pub(crate) fn start() -> Self {
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let directory = tempfile::tempdir().unwrap();
         let deploy = lightly_cluttered(directory.path(), "two-rooms").unwrap();
         let run_dir = directory.path().join("run");
         let up = sereno(&deploy, &run_dir, &["up", "--sim", "--quiet"]).stdin(Stdio::null()).spawn().unwrap();
-        let mut rig =
-            Self { directory, deploy, up, console: None, address: String::new(), claim: String::new() };
+        let mut rig = Self {
+            directory,
+            deploy,
+            up,
+            console: None,
+            address: String::new(),
+            claim: String::new(),
+            _turn: turn,
+        };
         wait_until("everything runs", || {
             let rows = supervisor::Client::connect(&rig.run_dir()).and_then(|mut client| client.ps());
             rows.is_ok_and(|all| {
