@@ -172,10 +172,16 @@ async fn a_guard_claims_watches_orders_takes_over_and_reads_the_report() {
 
     guard.press_words("Land").await;
     tokio::task::block_in_place(|| drone.wait_phase(Phase::Grounded));
-    guard.look("location.hash = '#/reports'").await;
-    guard
-        .until("a report is listed", "document.querySelector('#view a[href^=\"#/reports/\"]') !== null", LONG)
-        .await;
+    // The list is read when it is opened, and the report is written when the drone has come to rest.
+    let listed = "document.querySelector('#view a[href^=\"#/reports/\"]') !== null";
+    let began = Instant::now();
+    while guard.look(listed).await != serde_json::Value::Bool(true) {
+        assert!(began.elapsed() < LONG, "no report: {}", guard.look("document.body.innerText").await);
+        guard.look("location.hash = '#/password'").await;
+        tokio::time::sleep(Duration::from_millis(300)).await;
+        guard.look("location.hash = '#/reports'").await;
+        tokio::time::sleep(Duration::from_secs(1)).await;
+    }
     guard.look("document.querySelector('#view a[href^=\"#/reports/\"]').click()").await;
     guard.until("the report is read", "document.querySelector('#view').innerText.includes('%')", LONG).await;
     guard.picture("report").await;
