@@ -76,12 +76,16 @@ message! {
     pub struct Wish on "camera/wish" {
         /// Not to be obeyed at or after this time; at most [`WISH_LIFE_NS`] after the stamp.
         pub expiry_ns: u64,
-        /// What is wanted.
+        /// What is wanted; zero throughout in a wish for stills alone, which no encoder need wake for.
         pub format: Format,
         /// Whoever says more decides the format; between equals the larger picture does.
         pub priority: u32,
         /// Counts the key frames that this publisher has asked for.
         pub key_requests: u32,
+        /// 1: a JPEG a second is wanted on `camera/still`, besides the video of `format` or in its place.
+        pub still: u32,
+        /// Zero.
+        pub reserved: u32,
     }
 }
 
@@ -156,6 +160,12 @@ impl Video {
 }
 
 impl Format {
+    /// Whether this is no format at all: zero throughout.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        (self.width, self.height, self.fps, self.bitrate) == (0, 0, 0, 0)
+    }
+
     /// Whether this can be captured and encoded.
     #[must_use]
     pub fn is_valid(&self) -> bool {
@@ -169,11 +179,29 @@ impl Format {
 }
 
 impl Wish {
+    /// Whether it makes sense: video in a format that can be encoded, stills, or both.
+    #[must_use]
+    pub fn is_valid(&self) -> bool {
+        self.still <= 1 && (self.wants_video() || (self.wants_still() && self.format.is_none()))
+    }
+
+    /// Whether video is wanted, in `format`.
+    #[must_use]
+    pub fn wants_video(&self) -> bool {
+        self.format.is_valid()
+    }
+
+    /// Whether stills are wanted.
+    #[must_use]
+    pub fn wants_still(&self) -> bool {
+        self.still == 1
+    }
+
     /// Whether it may be obeyed at `now_ns`: it makes sense, has not expired and does not claim to be for ever.
     #[must_use]
     pub fn counts(&self, now_ns: u64) -> bool {
         let made_ns = self.header.stamp_ns;
-        self.format.is_valid()
+        self.is_valid()
             && made_ns <= now_ns.saturating_add(WISH_AHEAD_NS)
             && now_ns < self.expiry_ns
             && self.expiry_ns <= made_ns.saturating_add(WISH_LIFE_NS)
@@ -231,5 +259,24 @@ mod tests {
         let holder = Wish { priority: 1, ..wish };
         assert!(larger.beats(&wish) && !wish.beats(&larger) && holder.beats(&larger) && !wish.beats(&wish));
         assert!(!Format { width: 641, ..format }.is_valid() && !Format { fps: 0, ..format }.is_valid());
+    }
+
+    #[test]
+    fn a_wish_for_stills_alone_counts_and_wants_no_video() {
+        let format = Format { width: 640, height: 480, fps: 30, bitrate: 1_000_000 };
+        let made = 5_000_000_000;
+        let mut wish = Wish { expiry_ns: made + WISH_LIFE_NS, still: 1, ..Wish::default() };
+        wish.header.stamp_ns = made;
+        assert!(wish.counts(made) && wish.wants_still() && !wish.wants_video());
+        let both = Wish { format, ..wish };
+        assert!(both.counts(made) && both.wants_still() && both.wants_video());
+        for nonsense in [
+            Wish { still: 0, ..wish },
+            Wish { still: 2, ..both },
+            Wish { format: Format { width: 641, ..format }, ..wish },
+            Wish { format: Format { fps: 15, ..Format::default() }, ..wish },
+        ] {
+            assert!(!nonsense.counts(made), "{nonsense:?}");
+        }
     }
 }

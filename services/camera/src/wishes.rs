@@ -18,7 +18,7 @@ impl Wishes {
     pub fn take(&mut self, wish: &Wish, now: u64) {
         if !wish.counts(now) {
             // One that expired on its way is no fault.
-            self.refused += u64::from(!wish.format.is_valid());
+            self.refused += u64::from(!wish.is_valid());
             return;
         }
         let publisher = |known: &Wish| (known.header.publisher, known.header.incarnation);
@@ -30,18 +30,22 @@ impl Wishes {
             self.refused += 1;
             return;
         };
-        // Who is new has no frame before it.
-        self.key_wanted |= match place {
-            Some(known) if same.is_some() => known.key_requests != wish.key_requests,
-            _ => true,
-        };
+        // Who is new to the video has no frame before it.
+        self.key_wanted |= wish.wants_video()
+            && match place {
+                Some(known) if same.is_some() && known.wants_video() => {
+                    known.key_requests != wish.key_requests
+                }
+                _ => true,
+            };
         *place = Some(*wish);
     }
 
-    /// The format of the wish that goes before the others ([`Wish::beats`]) at `now`; `None` when nobody wants anything.
+    /// The format of the wish for video that goes before the others ([`Wish::beats`]) at `now`; `None` when nobody wants
+    /// video.
     #[must_use]
     pub fn wanted(&self, now: u64) -> Option<Format> {
-        let valid = self.newest.iter().flatten().filter(|wish| wish.counts(now));
+        let valid = self.newest.iter().flatten().filter(|wish| wish.counts(now) && wish.wants_video());
         let first = valid.reduce(|best, wish| if wish.beats(best) { wish } else { best })?;
         Some(first.format)
     }
@@ -99,6 +103,19 @@ mod tests {
         assert_eq!(width(&wishes, BEGIN + 500_000_004), None, "all have expired");
         wishes.take(&wish(4, 641, 0, 0, BEGIN), BEGIN);
         assert_eq!(wishes.refused(), 1);
+    }
+
+    #[test]
+    fn a_wish_for_stills_alone_asks_for_no_video_and_hides_none() {
+        let mut wishes = Wishes::default();
+        let still = Wish { still: 1, format: Format::default(), ..wish(1, 640, 2, 0, BEGIN) };
+        wishes.take(&still, BEGIN);
+        assert_eq!((wishes.wanted(BEGIN).is_none(), wishes.wants_key(), wishes.refused()), (true, false, 0));
+        wishes.take(&wish(2, 640, 0, 0, BEGIN), BEGIN);
+        assert_eq!(wishes.wanted(BEGIN).map(|format| format.width), Some(640));
+        wishes.key_sent();
+        wishes.take(&Wish { still: 1, ..wish(1, 320, 0, 0, BEGIN) }, BEGIN);
+        assert!(wishes.wants_key(), "the same publisher, new to the video");
     }
 
     #[test]
