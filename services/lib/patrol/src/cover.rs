@@ -164,9 +164,9 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
-    pub(crate) fn new(map: &Costmap, cover: &Cover, seen: &Bits) -> Self {
+    /// `seen` has one entry a cell: what need not be shown.
+    pub(crate) fn new(map: &Costmap, cover: &Cover, seen: &[bool]) -> Self {
         let raster = map.raster();
-        let covered = (0..raster.len()).map(|cell| seen.get(raster, cell)).collect();
         let queue = (0..cover.place.len())
             .filter_map(|block| {
                 let cell = cover.place(block)?;
@@ -175,7 +175,7 @@ impl Choice {
             })
             .collect();
         let least = raster.cells_of(map.limits().least_gain_m2 / 4.0);
-        Self { queue, covered, chosen: Vec::new(), least }
+        Self { queue, covered: seen.to_vec(), chosen: Vec::new(), least }
     }
 
     /// Works on; returns what is left of the budget, and whether nothing worth a look is left.

@@ -20,6 +20,7 @@ mod search;
 mod seen;
 mod smooth;
 mod tour;
+mod wishes;
 
 pub use costmap::Costmap;
 pub use limits::Limits;
@@ -28,3 +29,4 @@ pub use raster::{Bits, Raster, SIDE, WORDS};
 pub use round::{Progress, RoomPlan, Round, Stop};
 pub use route::{Route, RoutePlanner, Step};
 pub use seen::{Seen, Tally};
+pub use wishes::Wishes;

@@ -18,6 +18,8 @@ pub enum Obstacle {
     Unmapped,
     /// On the plan it is not connected at all.
     NoWay,
+    /// Nobody wants it looked at.
+    LeftOut,
 }
 
 impl Obstacle {
@@ -40,6 +42,7 @@ impl fmt::Display for Obstacle {
             Self::Narrow { width_m, needed_m } => write!(f, "passage {width_m:.2} m < {needed_m:.2} m"),
             Self::Unmapped => f.write_str("blocked by something not on the plan"),
             Self::NoWay => f.write_str("no way to it on the plan"),
+            Self::LeftOut => f.write_str("left out of the round"),
         }
     }
 }

@@ -15,6 +15,8 @@ const GAIN_M: f32 = 0.15;
 pub(crate) struct Refine {
     /// Blocks in order; the first and the last stay.
     tour: Vec<usize>,
+    /// Blocks that stay whatever they show.
+    fixed: Vec<usize>,
     /// How many looks and ways show each cell.
     count: Vec<u16>,
     position: usize,
@@ -22,9 +24,16 @@ pub(crate) struct Refine {
 }
 
 impl Refine {
-    pub(crate) fn new(map: &Costmap, cover: &Cover, seen: &[bool], tour: Vec<usize>) -> Self {
+    pub(crate) fn new(
+        map: &Costmap,
+        cover: &Cover,
+        seen: &[bool],
+        tour: Vec<usize>,
+        fixed: Vec<usize>,
+    ) -> Self {
         let mut refine = Self {
             tour,
+            fixed,
             count: seen.iter().map(|seen| u16::from(*seen)).collect(),
             position: 1,
             least: map.raster().cells_of(map.limits().least_gain_m2 / 4.0),
@@ -54,6 +63,10 @@ impl Refine {
     fn step(&mut self, map: &Costmap, cover: &Cover) -> usize {
         let k = self.position;
         let (before, here, after) = (self.tour[k - 1], self.tour[k], self.tour[k + 1]);
+        if self.fixed.contains(&here) {
+            self.position += 1;
+            return 1;
+        }
         self.add(cover, here, -1);
         self.add_way(map, cover, before, here, -1);
         self.add_way(map, cover, here, after, -1);

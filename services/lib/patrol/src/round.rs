@@ -4,7 +4,7 @@ use crate::cover::{Choice, Cover};
 use crate::refine::Refine;
 use crate::search::Search;
 use crate::tour::Tour;
-use crate::{Bits, Costmap, Obstacle, RoutePlanner, Seen, Step};
+use crate::{Bits, Costmap, Obstacle, RoutePlanner, Seen, Step, Wishes};
 
 /// A room is entered when this share of its floor can be flown over.
 const ENTERED_SHARE: f32 = 0.05;
@@ -26,6 +26,8 @@ pub struct Stop {
     pub room: Option<usize>,
     /// A place to look from; the way back to the pad is none.
     pub look: bool,
+    /// Which of the wished points it is.
+    pub point: Option<usize>,
 }
 
 /// What the round does about one room.
@@ -77,6 +79,11 @@ pub struct Round {
     asked: bool,
     rooms: Vec<RoomPlan>,
     stops: Vec<Stop>,
+    wishes: Wishes,
+    /// Of the wished points that can be reached: which, the cell, the block.
+    points: Vec<(usize, usize, usize)>,
+    /// Wished points that cannot be reached.
+    barred: Vec<usize>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,8 +99,15 @@ enum Stage {
 }
 
 impl Round {
-    /// Asks for a round over `rooms` rooms, from a place back to the pad, of what is not `seen`.
-    pub fn new(map: &Costmap, rooms: usize, from: (f32, f32), pad: (f32, f32), seen: &Seen) -> Self {
+    /// Asks for a round over `rooms` rooms, from a place back to the pad, of what is not `seen` and was not wished away.
+    pub fn new(
+        map: &Costmap,
+        rooms: usize,
+        from: (f32, f32),
+        pad: (f32, f32),
+        seen: &Seen,
+        wishes: &Wishes,
+    ) -> Self {
         let raster = map.raster();
         let start = start_cell(map, from);
         let mut reached = vec![false; raster.len()];
@@ -123,12 +137,17 @@ impl Round {
             search: Search::new(raster.len()),
             blocks: Vec::new(),
             refinements: 0,
-            seen: (0..raster.len()).map(|cell| seen.bits().get(raster, cell)).collect(),
+            seen: (0..raster.len())
+                .map(|cell| seen.bits().get(raster, cell) || wishes.leaves_out(map.room_of(cell)))
+                .collect(),
             to_see: Bits::default(),
             planner: RoutePlanner::new(map),
             asked: false,
             rooms: plans,
             stops: Vec::new(),
+            wishes: wishes.clone(),
+            points: Vec::new(),
+            barred: Vec::new(),
         }
     }
 
@@ -170,6 +189,11 @@ impl Round {
         &self.to_see
     }
 
+    /// Wished points that cannot be reached, by their index.
+    pub fn barred(&self) -> &[usize] {
+        &self.barred
+    }
+
     fn reach(&mut self, map: &Costmap, mut left: usize) -> usize {
         while left > 0 {
             let Some(cell) = self.queue.pop_front() else {
@@ -194,6 +218,13 @@ impl Round {
         let (left, done) = self.cover.look(map, &self.reached, left);
         if done {
             self.to_see = self.cover.to_see().clone();
+            if !self.wishes.leave_out.is_empty() {
+                for cell in self.cover.to_see().cells(map.raster()) {
+                    if self.wishes.leaves_out(map.room_of(cell)) {
+                        self.to_see.set(map.raster(), cell, false);
+                    }
+                }
+            }
             self.to_see.add(seen.bits());
             for cell in self.to_see.cells(map.raster()) {
                 if let Some(plan) = map.room_of(cell).and_then(|room| self.rooms.get_mut(room)) {
@@ -201,7 +232,7 @@ impl Round {
                     plan.reached += usize::from(self.reached[cell]);
                 }
             }
-            self.choice = Some(Choice::new(map, &self.cover, seen.bits()));
+            self.choice = Some(Choice::new(map, &self.cover, &self.seen));
             self.stage = Stage::Choose;
         }
         left
@@ -216,16 +247,32 @@ impl Round {
             let end = pad.map_or(start, |cell| self.cover.block_of(map, cell));
             self.blocks = vec![start];
             self.blocks.extend_from_slice(choice.chosen());
+            for (k, point) in self.wishes.points.iter().enumerate() {
+                let Some(point) = point else { continue };
+                match start_cell(map, *point).filter(|cell| self.reached[*cell]) {
+                    Some(cell) => self.points.push((k, cell, self.cover.block_of(map, cell))),
+                    None => self.barred.push(k),
+                }
+            }
+            let points = self.points.iter().map(|(.., block)| *block);
+            let new: Vec<usize> = points.filter(|block| !self.blocks[1..].contains(block)).collect();
+            for block in new {
+                // Two points of one block are one place to plan by.
+                if !self.blocks[1..].contains(&block) {
+                    self.blocks.push(block);
+                }
+            }
             self.blocks.push(end);
-            self.begin_order();
+            self.begin_order(map);
         }
         left
     }
 
-    fn begin_order(&mut self) {
+    fn begin_order(&mut self, map: &Costmap) {
         let cells = self.blocks.iter().filter_map(|block| self.cover.place(*block)).collect::<Vec<_>>();
+        let turns = cells.iter().map(|cell| self.wishes.turn(map.room_of(*cell))).collect();
         // Start and end have a place: they were reached.
-        self.tour = (cells.len() == self.blocks.len()).then(|| Tour::new(cells));
+        self.tour = (cells.len() == self.blocks.len()).then(|| Tour::new(cells, turns));
         self.stage = Stage::Order;
     }
 
@@ -240,7 +287,8 @@ impl Round {
                 tour.order().iter().filter_map(|k| self.blocks.get(*k).copied()).collect::<Vec<_>>();
             if self.refinements < REFINEMENTS {
                 self.refinements += 1;
-                self.refine = Some(Refine::new(map, &self.cover, &self.seen, ordered));
+                let fixed = self.points.iter().map(|(.., block)| *block).collect();
+                self.refine = Some(Refine::new(map, &self.cover, &self.seen, ordered, fixed));
                 self.stage = Stage::Refine;
             } else {
                 self.blocks = ordered;
@@ -256,25 +304,29 @@ impl Round {
         let (left, done) = refine.advance(map, &self.cover, left);
         if done {
             self.blocks = refine.tour().to_vec();
-            self.begin_order();
+            self.begin_order(map);
         }
         left
     }
 
     fn finish_stops(&mut self, map: &Costmap) {
         let middle = self.blocks.len().saturating_sub(1);
-        self.stops = self.blocks[..middle]
-            .iter()
-            .skip(1)
-            .filter_map(|block| self.cover.place(*block))
-            .map(|cell| {
-                let (x, y) = map.raster().centre(cell);
-                Stop { x, y, room: map.room_of(cell), look: true }
-            })
-            .collect();
+        let stop = |cell: usize, point| {
+            let (x, y) = map.raster().centre(cell);
+            Stop { x, y, room: map.room_of(cell), look: true, point }
+        };
+        self.stops.clear();
+        for block in self.blocks[..middle].iter().skip(1) {
+            let points = self.points.iter().filter(|(.., at)| at == block);
+            let before = self.stops.len();
+            self.stops.extend(points.map(|(point, cell, _)| stop(*cell, Some(*point))));
+            if self.stops.len() == before {
+                self.stops.extend(self.cover.place(*block).map(|cell| stop(cell, None)));
+            }
+        }
         let (x, y) = self.pad;
         let room = map.raster().cell(x, y).and_then(|cell| map.room_of(cell));
-        self.stops.push(Stop { x, y, room, look: false });
+        self.stops.push(Stop { x, y, room, look: false, point: None });
     }
 
     /// Finds out why a room cannot be seen.
@@ -284,6 +336,11 @@ impl Round {
             return left;
         };
         let next = Stage::Rooms { room: room + 1 };
+        if self.wishes.leaves_out(Some(room)) {
+            self.rooms[room].skipped = Some(Obstacle::LeftOut);
+            self.stage = next;
+            return left.saturating_sub(1);
+        }
         if plan.reached as f32 >= ENTERED_SHARE * plan.floor as f32
             || plan.to_see as f32 >= SEEN_SHARE * plan.floor as f32
         {

@@ -12,6 +12,8 @@ const GAIN_M: f32 = 0.01;
 #[derive(Clone, Debug)]
 pub(crate) struct Tour {
     cells: Vec<usize>,
+    /// When each one's turn comes: never before one of a lower number.
+    turns: Vec<usize>,
     /// Cost of the way between each two, row by row.
     between: Vec<f32>,
     order: Vec<usize>,
@@ -27,8 +29,9 @@ enum Stage {
 }
 
 impl Tour {
-    /// `cells` begins with the start and ends with the end of the tour.
-    pub(crate) fn new(cells: Vec<usize>) -> Self {
+    /// `cells` begins with the start and ends with the end of the tour; `turns` has one entry for each, of which those two
+    /// are not looked at.
+    pub(crate) fn new(cells: Vec<usize>, turns: Vec<usize>) -> Self {
         let count = cells.len();
         let mut between = vec![f32::INFINITY; count * count];
         for k in 0..count {
@@ -36,6 +39,7 @@ impl Tour {
         }
         Self {
             cells,
+            turns,
             between,
             order: Vec::new(),
             stage: Stage::Measure { from: 0, running: false, found: 0 },
@@ -139,9 +143,11 @@ impl Tour {
         let mut left: Vec<usize> = (1..last).collect();
         self.order = vec![0];
         let mut here = 0;
-        while let Some(k) =
-            (0..left.len()).min_by(|a, b| self.length(here, left[*a]).total_cmp(&self.length(here, left[*b])))
-        {
+        while let Some(k) = (0..left.len()).min_by(|a, b| {
+            let turn = |k: usize| self.turns[left[k]];
+            let length = |k: usize| self.length(here, left[k]);
+            turn(*a).cmp(&turn(*b)).then(length(*a).total_cmp(&length(*b)))
+        }) {
             here = left.swap_remove(k);
             self.order.push(here);
         }
@@ -152,6 +158,18 @@ impl Tour {
         self.between[a * self.cells.len() + b]
     }
 
+    /// Whether what stands at `i..=j` of the order may be turned round: all of it has the same turn.
+    fn one_turn(&self, i: usize, j: usize) -> bool {
+        self.order[i..=j].windows(2).all(|pair| self.turns[pair[0]] == self.turns[pair[1]])
+    }
+
+    /// Whether what has this turn may stand between the `j`th of the order and the next.
+    fn has_its_turn(&self, turn: usize, j: usize) -> bool {
+        let last = self.order.len() - 1;
+        (j == 0 || self.turns[self.order[j]] <= turn)
+            && (j + 1 == last || turn <= self.turns[self.order[j + 1]])
+    }
+
     /// One pass of 2-opt and of moving short runs elsewhere (Or 1976); whether it helped.
     fn improve(&mut self) -> bool {
         let mut better = false;
@@ -160,7 +178,7 @@ impl Tour {
             for j in i + 1..count - 1 {
                 let (a, b, c, d) = (self.order[i - 1], self.order[i], self.order[j], self.order[j + 1]);
                 let gain = self.length(a, b) + self.length(c, d) - self.length(a, c) - self.length(b, d);
-                if gain > GAIN_M {
+                if gain > GAIN_M && self.one_turn(i, j) {
                     self.order[i..=j].reverse();
                     better = true;
                 }
@@ -179,11 +197,17 @@ impl Tour {
         if i + run >= count {
             return false;
         }
+        if !self.one_turn(i, i + run - 1) {
+            return false;
+        }
         let (before, first) = (self.order[i - 1], self.order[i]);
         let (last, after) = (self.order[i + run - 1], self.order[i + run]);
         let saved = self.length(before, first) + self.length(last, after) - self.length(before, after);
         let mut best = (GAIN_M, None);
         for j in (0..count - 1).filter(|j| *j + 1 < i || *j >= i + run) {
+            if !self.has_its_turn(self.turns[first], j) {
+                continue;
+            }
             let (a, b) = (self.order[j], self.order[j + 1]);
             for (head, tail, turned) in [(first, last, false), (last, first, true)] {
                 let gain = saved - (self.length(a, head) + self.length(tail, b) - self.length(a, b));

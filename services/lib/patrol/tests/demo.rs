@@ -84,7 +84,14 @@ fn slices_are_bounded_and_change_nothing() {
     let site = delivered("demo");
     let seen = Seen::new(&site.map);
     let whole = plan_round(&site, site.pad, &seen);
-    let mut sliced = patrol::Round::new(&site.map, site.rooms.len(), site.pad, site.pad, &seen);
+    let mut sliced = patrol::Round::new(
+        &site.map,
+        site.rooms.len(),
+        site.pad,
+        site.pad,
+        &seen,
+        &patrol::Wishes::default(),
+    );
     let mut calls = 0;
     while sliced.advance(&site.map, &seen, 5_000) == patrol::Progress::Working {
         calls += 1;

@@ -164,7 +164,7 @@ fn a_start_too_near_to_a_wall_is_left_and_a_goal_in_one_is_moved() {
 fn a_round_from_nowhere_fails_and_one_with_nothing_left_goes_home() {
     let site = stores();
     let seen = Seen::new(&site.map);
-    let mut nowhere = Round::new(&site.map, 3, (-5.0, 0.0), PAD, &seen);
+    let mut nowhere = Round::new(&site.map, 3, (-5.0, 0.0), PAD, &seen, &patrol::Wishes::default());
     assert_eq!(nowhere.advance(&site.map, &seen, 1_000_000), Progress::Failed);
     let mut all = Seen::new(&site.map);
     all.restore(&[u64::MAX; SIDE * SIDE / 64]);
@@ -249,7 +249,7 @@ proptest! {
         let mut seen = Seen::new(&site.map);
         seen.mark(&site.map, x, y);
         let _ = route(&site, (x, y), (y, x));
-        let mut round = Round::new(&site.map, 3, (x, y), (y, x), &seen);
+        let mut round = Round::new(&site.map, 3, (x, y), (y, x), &seen, &patrol::Wishes::default());
         round.advance(&site.map, &seen, 1_000);
         prop_assert!(site.map.clearance(x, y) >= 0.0);
     }

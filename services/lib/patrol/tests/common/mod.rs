@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use floorplan::{Cell, DistanceField, Door, Plan, PlanHeader, Rooms, Sidecar};
-use patrol::{Costmap, Limits, Progress, Round, RoutePlanner, Seen, Step};
+use patrol::{Costmap, Limits, Progress, Round, RoutePlanner, Seen, Step, Wishes};
 
 pub(crate) struct Site {
     pub(crate) plan: Plan,
@@ -63,7 +63,11 @@ pub(crate) fn enlarged(rows: &[&str], times: usize) -> Vec<String> {
 }
 
 pub(crate) fn plan_round(site: &Site, from: (f32, f32), seen: &Seen) -> Round {
-    let mut round = Round::new(&site.map, site.rooms.len(), from, site.pad, seen);
+    plan_wished(site, from, seen, &Wishes::default())
+}
+
+pub(crate) fn plan_wished(site: &Site, from: (f32, f32), seen: &Seen, wishes: &Wishes) -> Round {
+    let mut round = Round::new(&site.map, site.rooms.len(), from, site.pad, seen, wishes);
     while round.advance(&site.map, seen, 100_000) == Progress::Working {}
     round
 }
