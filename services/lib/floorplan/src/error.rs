@@ -11,6 +11,14 @@ pub enum PlanError {
         /// What the parser said, on one line.
         reason: String,
     },
+    /// A sidecar cannot be written as yaml.
+    #[error("{file}: cannot be written: {reason}")]
+    Unwritable {
+        /// The file.
+        file: String,
+        /// What the writer said, on one line.
+        reason: String,
+    },
     /// A key that must be there is not.
     #[error("{file}: `{field}` is missing: {hint}")]
     Missing {
@@ -120,11 +128,17 @@ pub(crate) fn plain(text: &str) -> String {
     plain
 }
 
+fn first_line(error: &impl ToString) -> String {
+    plain(error.to_string().lines().next().unwrap_or("no reason given").trim())
+}
+
 impl PlanError {
     pub(crate) fn syntax(file: &str, error: &impl ToString) -> Self {
-        let text = error.to_string();
-        let reason = plain(text.lines().next().unwrap_or("no reason given").trim());
-        Self::Syntax { file: file.to_owned(), reason }
+        Self::Syntax { file: file.to_owned(), reason: first_line(error) }
+    }
+
+    pub(crate) fn unwritable(file: &str, error: &impl ToString) -> Self {
+        Self::Unwritable { file: file.to_owned(), reason: first_line(error) }
     }
 
     pub(crate) fn range(file: &str, field: &str, value: &dyn ToString, allowed: &str) -> Self {

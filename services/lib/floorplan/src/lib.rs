@@ -27,5 +27,5 @@ pub use error::PlanError;
 pub use header::{PictureMode, PlanHeader};
 pub use plan::{Cell, MAX_CELLS, MAX_SIDE, Plan};
 pub use rooms::{MAX_ROOMS, Rooms};
-pub use sidecar::{Area, Door, NamedArea, Pad, Sidecar};
+pub use sidecar::{Area, Door, NamedArea, Pad, RoundOrder, RoundPoint, Sidecar};
 pub use widest::widest_place;

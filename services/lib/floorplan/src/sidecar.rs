@@ -1,14 +1,8 @@
-use serde::Deserialize;
+mod check;
+
+use serde::{Deserialize, Serialize};
 
 use crate::PlanError;
-use crate::rooms::MAX_ROOMS;
-
-/// Most doors of a sidecar file.
-const MAX_DOORS: usize = 256;
-/// Most areas that must not be entered.
-const MAX_NO_FLY: usize = 64;
-/// Farthest coordinate, metres, as for the origin of a plan.
-const MAX_COORDINATE_M: f32 = 10_000.0;
 
 /// What a plan's picture cannot say: where the pad is, what the doors and rooms are called. A yaml file
 /// beside the header (`demo.yaml` has `demo.rooms.yaml`); every key may be left out.
@@ -22,8 +16,15 @@ const MAX_COORDINATE_M: f32 = 10_000.0;
 ///   - {name: Store, polygon: [[5, 4], [9, 4], [9, 8]]}
 /// no_fly:
 ///   - {name: Server rack, rectangle: [7.0, 5.0, 8.0, 6.0]}
+/// privacy:
+///   - {name: Washroom, rectangle: [9.0, 0.0, 11.0, 3.0]}
+/// round:
+///   order: [Store]
+///   leave_out: [Office 1]
+///   points:
+///     - {name: Safe, x: 8.2, y: 7.1}
 /// ```
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sidecar {
     /// Where the vehicle starts and lands.
@@ -34,10 +35,38 @@ pub struct Sidecar {
     pub rooms: Vec<NamedArea>,
     /// Areas that the vehicle must not enter in flight.
     pub no_fly: Vec<NamedArea>,
+    /// Areas that no camera may show.
+    pub privacy: Vec<NamedArea>,
+    /// How the building is to be looked at.
+    pub round: RoundOrder,
+}
+
+/// What the guard wants of a round; without anything it shows every room by the shortest way.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RoundOrder {
+    /// Rooms that come first, in this order; all others after them, as is shortest.
+    pub order: Vec<String>,
+    /// Rooms that are not looked at. They may be flown through.
+    pub leave_out: Vec<String>,
+    /// Places that are flown to in any case.
+    pub points: Vec<RoundPoint>,
+}
+
+/// A place of the round.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoundPoint {
+    /// As people call it.
+    pub name: String,
+    /// Plan frame, metres.
+    pub x: f32,
+    /// Plan frame, metres.
+    pub y: f32,
 }
 
 /// Where the vehicle starts and lands.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pad {
     /// Plan frame, metres.
@@ -50,7 +79,7 @@ pub struct Pad {
 }
 
 /// An opening that can be shut: the line between its two posts.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Door {
     /// As people call it.
@@ -62,7 +91,7 @@ pub struct Door {
 }
 
 /// A named part of the plan.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct NamedArea {
     /// As people call it.
@@ -73,7 +102,7 @@ pub struct NamedArea {
 }
 
 /// An outline in the plan frame, metres.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Area {
     /// Two opposite corners: x, y, x, y.
@@ -157,109 +186,33 @@ impl Sidecar {
     /// # Errors
     /// Unreadable yaml, unknown keys, names missing or used twice, coordinates that are not numbers.
     pub fn parse(file: &str, yaml: &[u8]) -> Result<Self, PlanError> {
-        let mut sidecar: Self =
+        let sidecar: Self =
             serde_saphyr::from_slice(yaml).map_err(|error| PlanError::syntax(file, &error))?;
+        sidecar.checked(file)
+    }
+
+    /// One that came by another way than a file of yaml, with its names tidied.
+    ///
+    /// # Errors
+    /// As [`Sidecar::parse`].
+    pub fn checked(mut self, file: &str) -> Result<Self, PlanError> {
         // "Store" and "Store " are one name to whoever reads them.
-        let doors = sidecar.doors.iter_mut().map(|door| &mut door.name);
-        let areas = sidecar.rooms.iter_mut().chain(&mut sidecar.no_fly);
-        for name in areas.map(|area| &mut area.name).chain(doors) {
+        let doors = self.doors.iter_mut().map(|door| &mut door.name);
+        let areas = self.rooms.iter_mut().chain(&mut self.no_fly).chain(&mut self.privacy);
+        let round = self.round.order.iter_mut().chain(&mut self.round.leave_out);
+        let points = self.round.points.iter_mut().map(|point| &mut point.name);
+        for name in areas.map(|area| &mut area.name).chain(doors).chain(round).chain(points) {
             *name = name.trim().to_owned();
         }
-        sidecar.check(file)?;
-        Ok(sidecar)
+        self.check(file)?;
+        Ok(self)
     }
 
-    fn check(&self, file: &str) -> Result<(), PlanError> {
-        if self.rooms.len() > MAX_ROOMS {
-            return Err(PlanError::range(
-                file,
-                "rooms",
-                &format!("{} rooms", self.rooms.len()),
-                "at most 48",
-            ));
-        }
-        if self.doors.len() > MAX_DOORS {
-            return Err(PlanError::range(
-                file,
-                "doors",
-                &format!("{} doors", self.doors.len()),
-                "at most 256",
-            ));
-        }
-        if let Some(pad) = &self.pad {
-            for (field, value) in [("pad.x", pad.x), ("pad.y", pad.y)] {
-                check_coordinate(file, field, value)?;
-            }
-            if !(-360.0..=360.0).contains(&pad.heading_deg) {
-                return Err(PlanError::range(
-                    file,
-                    "pad.heading_deg",
-                    &pad.heading_deg,
-                    "-360 to 360 degrees",
-                ));
-            }
-        }
-        for door in &self.doors {
-            let field = format!("doors: {}", door.name);
-            check_name(file, "doors.name", &door.name)?;
-            for value in [door.a.0, door.a.1, door.b.0, door.b.1] {
-                check_coordinate(file, &field, value)?;
-            }
-            if !(0.3..=10.0).contains(&door.width()) {
-                return Err(PlanError::range(
-                    file,
-                    &field,
-                    &format!("{:.2} m wide", door.width()),
-                    "0.3 to 10 m",
-                ));
-            }
-        }
-        check_areas(file, "rooms", &self.rooms)?;
-        if self.no_fly.len() > MAX_NO_FLY {
-            let said = format!("{} areas", self.no_fly.len());
-            return Err(PlanError::range(file, "no_fly", &said, "at most 64"));
-        }
-        check_areas(file, "no_fly", &self.no_fly)?;
-        let closed = |pad: &Pad| self.no_fly.iter().find(|zone| zone.area.contains(pad.x, pad.y));
-        if let Some(zone) = self.pad.as_ref().and_then(closed) {
-            let said = format!("in the no-fly zone {}", zone.name);
-            return Err(PlanError::range(file, "pad", &said, "outside every no-fly zone"));
-        }
-        Ok(())
+    /// The yaml that [`Sidecar::parse`] reads; `file` is named in errors only.
+    ///
+    /// # Errors
+    /// When it cannot be written: never for one that was checked.
+    pub fn yaml(&self, file: &str) -> Result<String, PlanError> {
+        serde_saphyr::to_string(self).map_err(|error| PlanError::unwritable(file, &error))
     }
-}
-
-fn check_areas(file: &str, key: &str, areas: &[NamedArea]) -> Result<(), PlanError> {
-    for (k, named) in areas.iter().enumerate() {
-        let field = format!("{key}: {}", named.name);
-        check_name(file, &format!("{key}.name"), &named.name)?;
-        if areas[..k].iter().any(|other| other.name == named.name) {
-            return Err(PlanError::range(file, &field, &"used twice", "one area a name"));
-        }
-        if let Area::Polygon(corners) = &named.area
-            && !(3..=256).contains(&corners.len())
-        {
-            let said = format!("{} corners", corners.len());
-            return Err(PlanError::range(file, &field, &said, "3 to 256"));
-        }
-        for value in named.area.coordinates() {
-            check_coordinate(file, &field, value)?;
-        }
-    }
-    Ok(())
-}
-
-fn check_name(file: &str, field: &str, name: &str) -> Result<(), PlanError> {
-    // What fits the page and the messages.
-    if (1..=31).contains(&name.len()) && !name.chars().any(char::is_control) {
-        return Ok(());
-    }
-    Err(PlanError::range(file, field, &format!("{name:?}"), "1 to 31 bytes of text"))
-}
-
-fn check_coordinate(file: &str, field: &str, value: f32) -> Result<(), PlanError> {
-    if value.abs() <= MAX_COORDINATE_M {
-        return Ok(());
-    }
-    Err(PlanError::range(file, field, &value, "-10000 to 10000 m"))
 }

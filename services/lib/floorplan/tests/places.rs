@@ -212,3 +212,57 @@ fn what_is_wrong_with_a_no_fly_zone_is_named() {
         assert!(text.starts_with("a.rooms.yaml: ") && text.contains(expected), "{zone}: {text}");
     }
 }
+
+const ROUND: &str = "round:
+  order: [Two]
+  leave_out: [One]
+  points:
+    - {name: Safe, x: 1.5, y: 2.5}
+privacy:
+  - {name: Washroom, rectangle: [3.0, 1.0, 4.0, 2.0]}
+";
+
+fn with_round(round: &str) -> Result<Sidecar, floorplan::PlanError> {
+    let rooms = "rooms:\n  - {name: One, rectangle: [0, 0, 2, 4]}\n  - {name: Two, polygon: [[2, 0], [6, 0], [6, 4]]}\n";
+    let rack = "no_fly:\n  - {name: Rack, rectangle: [3.0, 1.0, 4.0, 2.0]}\n";
+    let pad = "pad: {x: 1.0, y: 1.0}\ndoors:\n  - {name: Door, a: [2, 1], b: [2, 2]}\n";
+    Sidecar::parse("a.rooms.yaml", format!("{rooms}{rack}{pad}{round}").as_bytes())
+}
+
+#[test]
+fn a_sidecar_is_written_as_it_is_read() {
+    let sidecar = with_round(ROUND).unwrap();
+    assert_eq!(sidecar.round.points[0].name, "Safe");
+    let yaml = sidecar.yaml("a.rooms.yaml").unwrap();
+    assert_eq!(Sidecar::parse("a.rooms.yaml", yaml.as_bytes()).unwrap(), sidecar, "{yaml}");
+    let empty = Sidecar::default();
+    let yaml = empty.yaml("a.rooms.yaml").unwrap();
+    assert_eq!(Sidecar::parse("a.rooms.yaml", yaml.as_bytes()).unwrap(), empty, "{yaml}");
+}
+
+#[test]
+fn what_is_wrong_with_a_round_is_named() {
+    for (round, said) in [
+        ("round: {order: [Three]}", "`round.order` is \"Three\", allowed is names that stand in rooms"),
+        ("round: {leave_out: [One, One]}", "`round.leave_out` is \"One\" twice"),
+        ("round: {order: [One], leave_out: [One]}", "`round.order` is \"One\" is left out, too"),
+        (
+            "round: {points: [{name: Safe, x: 3.5, y: 1.5}]}",
+            "`round.points: Safe` is in the no-fly zone Rack",
+        ),
+        ("round: {points: [{name: Safe, x: .nan, y: 1.5}]}", "`round.points: Safe` is NaN"),
+        (
+            "round: {points: [{name: A, x: 1, y: 1}, {name: A, x: 1, y: 2}]}",
+            "`round.points: A` is used twice",
+        ),
+        ("round: {points: [{name: \"\", x: 1, y: 1}]}", "`round.points.name`"),
+        ("round: {colour: red}", "colour"),
+        ("privacy:\n  - {name: W, polygon: [[3, 1]]}", "`privacy: W` is 1 corners"),
+    ] {
+        let error = with_round(round).unwrap_err().to_string();
+        assert!(error.contains(said), "{round}: {error}");
+    }
+    let many: Vec<String> = (0..33).map(|k| format!("{{name: P{k}, x: 1, y: 1}}")).collect();
+    let error = with_round(&format!("round: {{points: [{}]}}", many.join(", "))).unwrap_err().to_string();
+    assert!(error.contains("33 points, allowed is at most 32"), "{error}");
+}
