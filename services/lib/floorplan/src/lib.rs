@@ -10,6 +10,7 @@
 mod cast;
 mod cone_table;
 mod distance;
+mod drawing;
 mod error;
 mod header;
 mod leap;
@@ -23,6 +24,7 @@ mod widest;
 pub use cast::{ConeModel, Hit, cast_cone};
 pub use cone_table::ConeTable;
 pub use distance::DistanceField;
+pub use drawing::{DRAWN_CELL_M, Drawing, Reading, picture_of_plan, plan_of_drawing};
 pub use error::PlanError;
 pub use header::{PictureMode, PlanHeader};
 pub use plan::{Cell, MAX_CELLS, MAX_SIDE, Plan};
