@@ -47,6 +47,7 @@ impl Default for BridgeConfig {
             ("pilot/channels", 10.0),
             ("flight/attitude", 15.0),
             ("camera/video", 60.0),
+            ("camera/still", 2.0),
         ];
         Self {
             certificates: "certs".to_owned(),

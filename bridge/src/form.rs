@@ -1,6 +1,6 @@
 //! How a message leaves: as JSON or as bytes, cut after what is filled.
 
-use ipc_types::{Field, Message, Particles, Patrol, Video};
+use ipc_types::{Field, Message, Particles, Patrol, Still, Video};
 use std::fmt::Write;
 
 /// Messages larger than this leave as bytes, however they are asked for.
@@ -42,7 +42,7 @@ impl Form {
         match T::TOPIC {
             Particles::TOPIC => Self::Columns,
             Patrol::TOPIC => Self::JsonCut,
-            Video::TOPIC => Self::BytesCut,
+            Video::TOPIC | Still::TOPIC => Self::BytesCut,
             _ if size_of::<T>() > MOST_JSON => Self::Bytes,
             _ => Self::Json,
         }
@@ -84,8 +84,13 @@ pub fn encode<T: Message>(message: &T) -> Vec<u8> {
         Form::Bytes => bytes.to_vec(),
         Form::Columns => cast::<T, Particles>(message).map(particle_columns).unwrap_or_default(),
         Form::BytesCut => {
-            let filled = cast::<T, Video>(message).map_or(0, |video| video.access_unit().len());
-            bytes.get(..std::mem::offset_of!(Video, bytes) + filled).unwrap_or_default().to_vec()
+            let end = cast::<T, Video>(message)
+                .map(|video| std::mem::offset_of!(Video, bytes) + video.access_unit().len())
+                .or_else(|| {
+                    cast::<T, Still>(message)
+                        .map(|still| std::mem::offset_of!(Still, bytes) + still.jpeg().len())
+                });
+            bytes.get(..end.unwrap_or(0)).unwrap_or_default().to_vec()
         }
     }
 }
@@ -218,6 +223,23 @@ mod tests {
         patrol.waypoints_used = u32::MAX;
         let broken: Value = serde_json::from_slice(&encode(&*patrol)).unwrap();
         assert_eq!(broken["waypoints"], Value::from(Vec::<Value>::new()));
+    }
+
+    #[test]
+    fn pictures_end_where_they_are_filled() {
+        let mut still = bytemuck::allocation::zeroed_box::<Still>();
+        let head = std::mem::offset_of!(Still, bytes);
+        (still.width, still.length) = (640, 3);
+        still.bytes.as_mut_slice()[..4].copy_from_slice(&[0xff, 0xd8, 0xff, 9]);
+        assert_eq!(encode(&*still)[head..], [0xff, 0xd8, 0xff]);
+        still.length = u32::MAX;
+        assert_eq!(encode(&*still).len(), head, "a length that makes no sense");
+        let mut video = bytemuck::allocation::zeroed_box::<Video>();
+        video.length = 5;
+        assert_eq!(encode(&*video).len(), std::mem::offset_of!(Video, bytes) + 5);
+        for (topic, form) in [(Form::of::<Still>(), "bytes, cut"), (Form::of::<Video>(), "bytes, cut")] {
+            assert_eq!(topic.word(), form);
+        }
     }
 
     #[test]

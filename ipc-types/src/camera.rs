@@ -1,4 +1,5 @@
-//! `camera/picture`, `camera/video` and `camera/wish`: raw frames, what they are encoded to, and who wants which.
+//! `camera/picture`, `camera/video`, `camera/still` and `camera/wish`: raw frames, what they are encoded to, and who wants
+//! which.
 
 use crate::Bytes;
 use crate::field::{fields, message};
@@ -11,6 +12,10 @@ pub const MAX_PICTURE_HEIGHT: u32 = 1080;
 pub const PICTURE_BYTES: usize = 1920 * 1080 * 3 / 2;
 /// Room for one encoded frame: a key frame of 1920x1080 at 8 Mb/s is about half of this.
 pub const VIDEO_BYTES: usize = 262_144;
+/// Room for one still picture: 640x480 of a cluttered room at quality 80 is about half of this.
+pub const STILL_BYTES: usize = 131_072;
+/// Widest still picture, pixels.
+pub const MAX_STILL_WIDTH: u32 = 720;
 /// For how long a wish may be obeyed after it was made, nanoseconds: who wants video says so again and again.
 pub const WISH_LIFE_NS: u64 = 1_000_000_000;
 /// A wish may be this much newer than the step that takes it, nanoseconds: a step reads the clock before its inputs.
@@ -68,6 +73,29 @@ message! {
         pub length: u32,
         /// The access unit.
         pub bytes: Bytes<262_144>,
+    }
+}
+
+message! {
+    /// One still picture as JPEG (baseline, full range), at most [`MAX_STILL_WIDTH`] pixels wide: for whoever cannot decode
+    /// [`Video`].
+    pub struct Still on "camera/still" {
+        /// As the picture's.
+        pub capture_ns: u64,
+        /// As the picture's.
+        pub frame: u64,
+        /// What encoding it took, nanoseconds.
+        pub encode_ns: u64,
+        /// Pixels.
+        pub width: u32,
+        /// Pixels.
+        pub height: u32,
+        /// Quality it was encoded with, 1 to 100: lower where the picture would not have fitted.
+        pub quality: u32,
+        /// Filled bytes; more than [`STILL_BYTES`] is a broken message.
+        pub length: u32,
+        /// The file.
+        pub bytes: Bytes<131_072>,
     }
 }
 
@@ -155,6 +183,14 @@ impl Video {
     /// The access unit; empty when the length makes no sense.
     #[must_use]
     pub fn access_unit(&self) -> &[u8] {
+        self.bytes.as_slice().get(..self.length as usize).unwrap_or(&[])
+    }
+}
+
+impl Still {
+    /// The JPEG file; empty when the length makes no sense.
+    #[must_use]
+    pub fn jpeg(&self) -> &[u8] {
         self.bytes.as_slice().get(..self.length as usize).unwrap_or(&[])
     }
 }

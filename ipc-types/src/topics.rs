@@ -3,7 +3,7 @@
 use crate::{
     Attitude, Channels, Command, Echo, FlightState, FlowMotion, Grid, Health, Message, Particles, Patrol,
     Picture, PilotState, Ping, Polar, Pose, Power, Setpoint, Shutter, SignalIn, SignalOut, SonarRanges,
-    Sticks, Trace, Truth, Video, View, Wish,
+    Sticks, Still, Trace, Truth, Video, View, Wish,
 };
 
 /// Something to be done with a message type known only by its topic.
@@ -57,6 +57,7 @@ topics!(
     Command,
     Picture,
     Video,
+    Still,
     Wish,
     SignalIn,
     SignalOut,

@@ -120,7 +120,7 @@ fn shells_keep_to_their_family() {
         ("navigation", &[][..]),
         ("pilot", &[][..]),
         ("simulator", &["rustix"][..]),
-        ("camera", &["openh264", "openh264-sys2"][..]),
+        ("camera", &["image", "openh264", "openh264-sys2"][..]),
         ("stream", &["async-trait", "bytes", "rtc", "serde_json", "tokio", "webrtc"][..]),
         (
             "console",

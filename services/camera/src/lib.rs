@@ -2,7 +2,8 @@
 //!
 //! Whoever wants video says so on `camera/wish`, again and again ([`Wishes`]). While somebody does, a source is asked for
 //! frames ([`Source`]) and each becomes one access unit on `camera/video` ([`Encoder`]), with the time at which it was captured.
-//! When the last wish has expired nothing is captured and nothing encoded.
+//! When the last wish has expired nothing is captured and nothing encoded. A wish for stills alone takes one frame a second and
+//! makes a JPEG of it on `camera/still` ([`Stills`]); the encoder sleeps on.
 
 mod config;
 mod encoder;
@@ -10,6 +11,7 @@ mod pattern;
 mod service;
 mod simulated;
 mod source;
+mod still;
 mod wishes;
 mod y4m;
 
@@ -18,6 +20,7 @@ pub use encoder::{EncodeError, Encoded, Encoder};
 pub use pattern::Pattern;
 pub use service::Camera;
 pub use source::{Frame, Source};
+pub use still::{STILL_FORMAT, StillError, Stills, Taken};
 pub use wishes::Wishes;
 pub use y4m::{Y4m, Y4mError};
 

@@ -1,10 +1,10 @@
-//! The service: wishes in, video out.
+//! The service: wishes in, video and stills out.
 
 use crate::config::{FILE, TEST_PATTERN};
 use crate::simulated::Simulated;
-use crate::source::Source;
-use crate::{CameraConfig, EncodeError, Encoder, Pattern, Wishes, Y4m};
-use ipc_types::{Format, Text, Video, Wish};
+use crate::source::{Frame, Pace, Source};
+use crate::{CameraConfig, EncodeError, Encoder, Pattern, STILL_FORMAT, StillError, Stills, Wishes, Y4m};
+use ipc_types::{Format, Still, Text, Video, Wish};
 use runtime::{Input, Output, Ports, Service, Start, StartError};
 use std::fmt::Write;
 
@@ -13,14 +13,18 @@ const SILENCE_NS: u64 = 1_000_000_000;
 /// After a frame that did not fit its place the bitrate is cut to this share of what is wished for, for this long.
 const CUT: (u32, u32) = (1, 3);
 const CUT_NS: u64 = 5_000_000_000;
+/// A frame that comes so much before the second is over is taken for the next still: the one after it would be later by more.
+const STILL_EARLY_NS: u64 = 200_000_000;
 
 /// Encodes what the source gives, while somebody wants it.
 pub struct Camera {
     wishes: Input<Wish>,
     videos: Output<Video>,
+    stills: Output<Still>,
     source: Box<dyn Source>,
     state: Wishes,
     encoder: Encoder,
+    still: Taker,
     key_pause_ns: u64,
     last_key_ns: Option<u64>,
     /// When a frame came last, or sleep ended.
@@ -31,6 +35,16 @@ pub struct Camera {
     /// What the encoder said last that it could not do.
     trouble: Option<EncodeError>,
     failed: u64,
+}
+
+/// Makes stills at their pace.
+#[derive(Default)]
+struct Taker {
+    stills: Stills,
+    pace: Pace,
+    taken: u64,
+    failed: u64,
+    trouble: Option<StillError>,
 }
 
 /// The last frame, for people.
@@ -65,9 +79,11 @@ impl Service for Camera {
         Ok(Self {
             wishes: ports.input()?,
             videos: ports.output()?,
+            stills: ports.output()?,
             source,
             state: Wishes::default(),
             encoder: Encoder::new(config.key_every_s),
+            still: Taker::default(),
             key_pause_ns: u64::from(config.key_pause_ms) * 1_000_000,
             last_key_ns: None,
             heard_ns: 0,
@@ -85,57 +101,59 @@ impl Service for Camera {
             self.state.take(&wish, now);
         }
         let wanted = self.state.wanted(now);
-        let Some(frame) = self.source.frame(now, wanted.as_ref()) else {
-            if wanted.is_none() {
+        let still = self.state.wants_still(now);
+        let captured = wanted.or_else(|| still.then_some(STILL_FORMAT));
+        let Some(frame) = self.source.frame(now, captured.as_ref()) else {
+            if captured.is_none() {
                 self.heard_ns = now;
             }
             return;
         };
-        let Some(mut format) = wanted else { return };
         self.heard_ns = now;
-        if now < self.cut_until_ns {
-            format.bitrate = (format.bitrate / CUT.1 * CUT.0).max(50_000);
-        }
-        let rested = self.last_key_ns.is_none_or(|last| now.saturating_sub(last) >= self.key_pause_ns);
-        let key = self.state.wants_key() && rested;
-        let Some(mut video) = self.videos.loan() else { return };
-        let began = runtime::monotonic_ns();
-        match self.encoder.encode(frame, &format, key, video.bytes.as_mut_slice()) {
-            // The encoder left a frame out.
-            Ok(encoded) if encoded.length == 0 => {}
-            Ok(encoded) => {
-                video.capture_ns = frame.capture_ns;
-                video.frame = frame.number;
-                video.encode_ns = runtime::monotonic_ns() - began;
-                video.format = Format { width: frame.width, height: frame.height, ..format };
-                video.key = u32::from(encoded.key);
-                video.length = encoded.length as u32;
-                self.last =
-                    Last { format: video.format, encode_ns: video.encode_ns, frames: self.last.frames + 1 };
-                video.send();
-                if encoded.key {
+        if let Some(format) = wanted {
+            let cut = now < self.cut_until_ns;
+            let bitrate = if cut { (format.bitrate / CUT.1 * CUT.0).max(50_000) } else { format.bitrate };
+            let rested = self.last_key_ns.is_none_or(|last| now.saturating_sub(last) >= self.key_pause_ns);
+            let filming = Filming {
+                videos: &mut self.videos,
+                encoder: &mut self.encoder,
+                last: &mut self.last,
+                format: Format { bitrate, ..format },
+                key: self.state.wants_key() && rested,
+            };
+            match filming.film(frame) {
+                Ok(true) => {
                     self.last_key_ns = Some(now);
                     self.state.key_sent();
                 }
-            }
-            Err(error) => {
-                if matches!(error, EncodeError::TooLarge { .. }) {
-                    self.cut_until_ns = now + CUT_NS;
+                Ok(false) => {}
+                Err(error) => {
+                    if matches!(error, EncodeError::TooLarge { .. }) {
+                        self.cut_until_ns = now + CUT_NS;
+                    }
+                    self.failed += 1;
+                    self.trouble = Some(error);
                 }
-                self.failed += 1;
-                self.trouble = Some(error);
             }
+        }
+        if still && self.still.pace.is_due(now, 1, STILL_EARLY_NS) {
+            self.still.take(&mut self.stills, &frame);
         }
     }
 
     fn status(&self, text: &mut Text<96>) {
         let Last { format, encode_ns, frames } = self.last;
         // What does not fit is cut off.
+        let stills = self.state.wants_still(self.now);
+        let silent_ns = self.now.saturating_sub(self.heard_ns);
         let _ = match (self.state.wanted(self.now), &self.trouble) {
-            (None, _) => write!(text, "asleep, {frames} frames so far"),
-            (Some(_), _) if self.now.saturating_sub(self.heard_ns) > SILENCE_NS => {
-                write!(text, "the source gives no frames")
-            }
+            (None, _) if !stills => write!(text, "asleep, {frames} frames so far"),
+            (None, _) if silent_ns > 3 * SILENCE_NS => write!(text, "the source gives no frames"),
+            (None, _) => match &self.still.trouble {
+                Some(trouble) => write!(text, "{trouble}"),
+                None => write!(text, "a still a second, {} so far", self.still.taken),
+            },
+            (Some(_), _) if silent_ns > SILENCE_NS => write!(text, "the source gives no frames"),
             (Some(_), Some(trouble)) if self.failed > 0 && self.now < self.cut_until_ns => {
                 write!(text, "{trouble}")
             }
@@ -153,6 +171,63 @@ impl Service for Camera {
     }
 
     fn refused(&self) -> u64 {
-        self.state.refused() + self.source.refused() + self.failed
+        self.state.refused() + self.source.refused() + self.failed + self.still.failed
+    }
+}
+
+/// What it takes to encode one frame, while the source still holds it.
+struct Filming<'a> {
+    videos: &'a mut Output<Video>,
+    encoder: &'a mut Encoder,
+    last: &'a mut Last,
+    format: Format,
+    key: bool,
+}
+
+impl Filming<'_> {
+    /// Encodes a frame and sends it; whether it was a key frame.
+    fn film(self, frame: Frame<'_>) -> Result<bool, EncodeError> {
+        let Some(mut video) = self.videos.loan() else { return Ok(false) };
+        let began = runtime::monotonic_ns();
+        let encoded = self.encoder.encode(frame, &self.format, self.key, video.bytes.as_mut_slice())?;
+        if encoded.length == 0 {
+            // The encoder left a frame out.
+            return Ok(false);
+        }
+        video.capture_ns = frame.capture_ns;
+        video.frame = frame.number;
+        video.encode_ns = runtime::monotonic_ns() - began;
+        video.format = Format { width: frame.width, height: frame.height, ..self.format };
+        video.key = u32::from(encoded.key);
+        video.length = encoded.length as u32;
+        let frames = self.last.frames + 1;
+        *self.last = Last { format: video.format, encode_ns: video.encode_ns, frames };
+        video.send();
+        Ok(encoded.key)
+    }
+}
+
+impl Taker {
+    /// Makes a still of a frame and sends it.
+    fn take(&mut self, stills: &mut Output<Still>, frame: &Frame<'_>) {
+        let Some(mut still) = stills.loan() else { return };
+        let began = runtime::monotonic_ns();
+        match self.stills.take(frame, still.bytes.as_mut_slice()) {
+            Ok(taken) => {
+                still.capture_ns = frame.capture_ns;
+                still.frame = frame.number;
+                still.encode_ns = runtime::monotonic_ns() - began;
+                (still.width, still.height) = (taken.width, taken.height);
+                still.quality = u32::from(taken.quality);
+                still.length = taken.length as u32;
+                still.send();
+                self.taken += 1;
+                self.trouble = None;
+            }
+            Err(error) => {
+                self.failed += 1;
+                self.trouble = Some(error);
+            }
+        }
     }
 }

@@ -57,10 +57,34 @@ impl Pace {
     /// so much before the raster is taken for it, as the next one would be later by more.
     pub(crate) fn is_due(&mut self, now: u64, fps: u32, early_ns: u64) -> bool {
         let period = 1_000_000_000 / u64::from(fps.max(1));
+        // Left from a slower pace.
+        if self.due_ns > now + period + early_ns {
+            self.due_ns = now;
+        }
         if now + early_ns < self.due_ns {
             return false;
         }
         self.due_ns = if now > self.due_ns + period { now + period } else { self.due_ns + period };
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quicker_pace_does_not_wait_for_the_slower_one() {
+        let mut pace = Pace::default();
+        let begin = 5_000_000_000;
+        assert!(pace.is_due(begin, 1, 0) && !pace.is_due(begin + 10_000_000, 1, 0));
+        assert!(pace.is_due(begin + 20_000_000, 30, 0), "a second is not waited for");
+        let passed =
+            (1..=100).filter(|tick| pace.is_due(begin + 20_000_000 + tick * 10_000_000, 30, 0)).count();
+        assert!((29..=31).contains(&passed), "{passed}");
+        // Taken early: the next is still a period after the raster.
+        let mut pace = Pace::default();
+        let passed = (0..100).filter(|tick| pace.is_due(begin + tick * 67_000_000, 1, 200_000_000)).count();
+        assert!((6..=8).contains(&passed), "{passed} in 6.7 s");
     }
 }

@@ -50,6 +50,12 @@ impl Wishes {
         Some(first.format)
     }
 
+    /// Whether somebody wants stills at `now`.
+    #[must_use]
+    pub fn wants_still(&self, now: u64) -> bool {
+        self.newest.iter().flatten().any(|wish| wish.counts(now) && wish.wants_still())
+    }
+
     /// Whether somebody has asked for a key frame since the last call that gave one.
     #[must_use]
     pub fn wants_key(&self) -> bool {
@@ -111,6 +117,7 @@ mod tests {
         let still = Wish { still: 1, format: Format::default(), ..wish(1, 640, 2, 0, BEGIN) };
         wishes.take(&still, BEGIN);
         assert_eq!((wishes.wanted(BEGIN).is_none(), wishes.wants_key(), wishes.refused()), (true, false, 0));
+        assert!(wishes.wants_still(BEGIN) && !wishes.wants_still(BEGIN + 500_000_000), "until it expires");
         wishes.take(&wish(2, 640, 0, 0, BEGIN), BEGIN);
         assert_eq!(wishes.wanted(BEGIN).map(|format| format.width), Some(640));
         wishes.key_sent();

@@ -1,8 +1,8 @@
 //! What was encoded, decoded again.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use camera::{Encoder, Frame, Pattern, Source};
-use ipc_types::{Format, VIDEO_BYTES};
+use camera::{Encoder, Frame, Pattern, Source, StillError, Stills};
+use ipc_types::{Format, STILL_BYTES, VIDEO_BYTES};
 use openh264::decoder::Decoder;
 use openh264::formats::YUVSource;
 
@@ -163,4 +163,50 @@ fn a_frame_that_does_not_fit_is_refused_and_the_next_is_a_key_frame() {
     let error = bench.encoder.encode(frame, &FORMAT, true, &mut [0; 100]).unwrap_err().to_string();
     assert!(error.contains("640x480") && error.contains("does not fit"), "{error}");
     assert!(bench.frame(&FORMAT, false).key);
+}
+
+/// A still is decoded by another decoder than it was made by, and shows the bars of the pattern in their colours.
+#[test]
+fn a_still_is_a_jpeg_of_the_frame_at_most_720_wide() {
+    let mut source = Pattern::default();
+    let mut stills = Stills::default();
+    let mut out = vec![0; STILL_BYTES];
+    for (width, height, wanted) in
+        [(640, 480, (640, 480)), (1280, 720, (640, 360)), (1920, 1080, (640, 360)), (160, 120, (160, 120))]
+    {
+        let format = Format { width, height, fps: 10, bitrate: 1_000_000 };
+        let frame = source.frame(u64::from(width) * 1_000_000_000, Some(&format)).unwrap();
+        let taken = stills.take(&frame, &mut out).unwrap();
+        assert_eq!((taken.width, taken.height), wanted);
+        let jpeg = image::load_from_memory_with_format(&out[..taken.length], image::ImageFormat::Jpeg);
+        let picture = jpeg.unwrap().to_rgb8();
+        assert_eq!(picture.dimensions(), wanted);
+        // The middle of the second bar is yellow, of the sixth red.
+        for (bar, wanted) in [(1, [191, 191, 0]), (5, [191, 0, 0])] {
+            let pixel = picture.get_pixel((2 * bar + 1) * taken.width / 16, taken.height / 4).0;
+            let near = pixel.iter().zip(wanted).all(|(a, b): (&u8, u8)| a.abs_diff(b) < 16);
+            assert!(near, "{width}x{height}: bar {bar} is {pixel:?}, wanted {wanted:?}");
+        }
+    }
+}
+
+#[test]
+fn a_still_that_does_not_fit_is_made_coarser_and_then_refused() {
+    let noise: Vec<u8> = (0_u32..640 * 480).map(|k| (k.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    let frame = Frame {
+        capture_ns: 1,
+        number: 1,
+        width: 640,
+        height: 480,
+        stride: 640,
+        planes: [&noise, &noise[..640 * 120], &noise[..640 * 120]],
+    };
+    let mut out = vec![0; STILL_BYTES];
+    let mut stills = Stills::default();
+    let taken = stills.take(&frame, &mut out).unwrap();
+    assert!(taken.quality < 80 && taken.length <= STILL_BYTES, "{taken:?}");
+    let error = stills.take(&frame, &mut out[..1000]).unwrap_err();
+    assert_eq!(error, StillError::TooLarge { width: 640, height: 480, room: 1000 });
+    let short = Frame { planes: [&noise[..640], &noise, &noise], ..frame };
+    assert_eq!(stills.take(&short, &mut out).unwrap_err(), StillError::Broken);
 }

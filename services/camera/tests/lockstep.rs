@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camera::{Camera, CameraConfig};
-use ipc_types::{Format, Truth, Video, View, WISH_LIFE_NS, Wish};
+use ipc_types::{Format, Still, Truth, Video, View, WISH_LIFE_NS, Wish};
 use openh264::decoder::Decoder;
 use openh264::formats::YUVSource;
 use runtime::{Cache, Input, Lockstep, Output, load_manifest};
@@ -185,4 +185,43 @@ fn a_wish_for_ever_or_for_an_odd_size_is_not_obeyed() {
     bench.wishes.publish(&odd);
     assert_eq!(bench.run(300, None).videos.len(), 0);
     assert_eq!(bench.bus.refused("camera"), 1);
+}
+
+/// Stills alone: one frame a second is drawn and no video encoded; beside video they come out of its frames.
+#[test]
+fn stills_come_once_a_second_with_and_without_video() {
+    let mut bench = Bench::new(CameraConfig::default());
+    let mut stills: Input<Still> = bench.bus.tool("cli").input().unwrap();
+    let mut film = |bench: &mut Bench, format: Format, still: u32, seconds: u64| {
+        let (mut taken, mut seen) = (Vec::new(), Seen::default());
+        for _ in 0..seconds * 5 {
+            let expiry_ns = bench.bus.now() + 400 * MS;
+            assert!(bench.wishes.publish(&Wish { format, still, expiry_ns, ..Wish::default() }));
+            let more = bench.run(200, None);
+            seen.videos.extend(more.videos);
+            seen.views += more.views;
+            while let Some(still) = stills.receive() {
+                let picture = image::load_from_memory_with_format(still.jpeg(), image::ImageFormat::Jpeg);
+                let picture = picture.unwrap().to_luma8();
+                assert_eq!(picture.dimensions(), (still.width, still.height));
+                let mean = picture.pixels().map(|pixel| u64::from(pixel.0[0])).sum::<u64>()
+                    / u64::from(still.width * still.height);
+                assert!((20..240).contains(&mean), "a picture, not a black one: {mean}");
+                taken.push((still.width, still.capture_ns));
+            }
+        }
+        (taken, seen)
+    };
+    let (taken, seen) = film(&mut bench, Format::default(), 1, 6);
+    assert!((5..=7).contains(&taken.len()), "{taken:?}");
+    assert!(seen.videos.is_empty() && seen.views <= taken.len() + 1, "{} views", seen.views);
+    assert!(taken.iter().all(|still| still.0 == 640) && taken.is_sorted_by(|a, b| a.1 < b.1), "{taken:?}");
+    assert!(bench.bus.status("camera").starts_with("a still a second"), "{}", bench.bus.status("camera"));
+    let hd = Format { width: 1280, height: 720, fps: 15, bitrate: 2_000_000 };
+    let (taken, seen) = film(&mut bench, hd, 1, 4);
+    assert!((3..=5).contains(&taken.len()) && seen.videos.len() >= 50, "{taken:?}, {}", seen.videos.len());
+    assert_eq!(taken.last().unwrap().0, 640, "smaller than the video");
+    let (taken, _) = film(&mut bench, hd, 0, 2);
+    assert!(taken.is_empty(), "nobody asks for stills: {taken:?}");
+    assert_eq!(bench.bus.refused("camera"), 0);
 }
