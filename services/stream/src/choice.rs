@@ -24,6 +24,8 @@ pub struct Choice {
     pub account: String,
     /// It holds the sticks.
     pub flies: bool,
+    /// Which of the account's sessions.
+    pub since: u64,
 }
 
 impl Choice {
@@ -35,7 +37,7 @@ impl Choice {
         let flying = flying.max_by_key(|party| party.since);
         let flies = flying.is_some();
         let party = flying.or_else(|| parties.min_by_key(|party| party.since))?;
-        Some(Self { format: party.format, account: party.account.clone(), flies })
+        Some(Self { format: party.format, account: party.account.clone(), flies, since: party.since })
     }
 }
 

@@ -41,6 +41,10 @@ pub struct StreamConfig {
     pub servers: Vec<IceServer>,
     /// Most viewers at a time.
     pub viewers: u32,
+    /// Bits a second that are sent however bad the lines are, and however good.
+    pub bitrate_least: u32,
+    /// See there.
+    pub bitrate_most: u32,
 }
 
 impl Default for StreamConfig {
@@ -52,6 +56,8 @@ impl Default for StreamConfig {
             relay_only: false,
             servers: Vec::new(),
             viewers: 8,
+            bitrate_least: 150_000,
+            bitrate_most: 6_000_000,
         }
     }
 }
@@ -64,6 +70,8 @@ impl Validate for StreamConfig {
             return Err(ConfigError::range("tcp", false, "true where udp = false"));
         }
         within("viewers", f64::from(self.viewers), 1.0..=32.0)?;
+        within("bitrate_least", f64::from(self.bitrate_least), 50_000.0..=20_000_000.0)?;
+        within("bitrate_most", f64::from(self.bitrate_most), f64::from(self.bitrate_least)..=20_000_000.0)?;
         for server in &self.servers {
             let known = |url: &String| {
                 url.len() <= 256 && ["stun:", "turn:", "turns:"].iter().any(|scheme| url.starts_with(scheme))
@@ -81,8 +89,11 @@ impl Validate for StreamConfig {
                 return Err(ConfigError::range("servers.username", &server.username, allowed));
             }
         }
-        if self.relay_only && !self.servers.iter().any(|s| s.urls.iter().any(|url| url.starts_with("turn"))) {
-            return Err(ConfigError::range("relay_only", true, "false, or a TURN server among servers"));
+        // The drone itself reaches a relay by UDP only; viewers reach it by whatever its address says.
+        let by_udp = |url: &String| url.starts_with("turn:") && !url.ends_with("transport=tcp");
+        if self.relay_only && !self.servers.iter().any(|server| server.urls.iter().any(by_udp)) {
+            let allowed = "false, or a TURN server by UDP among servers (turn:HOST:PORT)";
+            return Err(ConfigError::range("relay_only", true, allowed));
         }
         Ok(())
     }
@@ -111,6 +122,16 @@ mod tests {
                 "servers.username",
             ),
             (StreamConfig { relay_only: true, ..default.clone() }, "relay_only"),
+            (
+                StreamConfig {
+                    relay_only: true,
+                    servers: vec![server("turn:x?transport=tcp", "me", "hush")],
+                    ..default.clone()
+                },
+                "relay_only",
+            ),
+            (StreamConfig { bitrate_least: 10, ..default.clone() }, "bitrate_least"),
+            (StreamConfig { bitrate_most: 100_000, ..default.clone() }, "bitrate_most"),
         ] {
             let error = config.validate().unwrap_err().to_string();
             assert!(error.contains(word) && error.contains("allowed"), "{error}");

@@ -1,6 +1,8 @@
 //! All viewers, on a runtime of their own beside the service's loop.
 
+use crate::line::for_all;
 use crate::session::{Ends, QUEUE, Told, Unit, run};
+use crate::viewer::LineState;
 use crate::{Call, Choice, FromViewer, Party, StreamConfig, ToViewer};
 use ipc_types::Format;
 use std::sync::Arc;
@@ -33,6 +35,7 @@ struct Session {
     inbox: mpsc::Sender<FromViewer>,
     frames: mpsc::Sender<Arc<Unit>>,
     dropped: Arc<AtomicU64>,
+    line: Arc<LineState>,
 }
 
 /// The sessions. Dropped, it ends them all.
@@ -93,15 +96,18 @@ impl Hub {
         let (frames, queue) = mpsc::channel(QUEUE);
         let (say, mut replies) = mpsc::channel::<ToViewer>(INBOX);
         let dropped = Arc::new(AtomicU64::new(0));
+        let line = Arc::new(LineState::default());
         let ends = Ends {
             config: Arc::clone(&self.config),
             number: runtime::mix_seed(self.seed, self.number),
+            since: self.number,
             inbox: messages,
             say,
             frames: queue,
             told: self.told.subscribe(),
             key_requests: Arc::clone(&self.key_requests),
             dropped: Arc::clone(&dropped),
+            line: Arc::clone(&line),
         };
         let account = if call.account.is_empty() { account } else { &call.account };
         let party = Party {
@@ -126,7 +132,7 @@ impl Hub {
                 wake.wake();
             }
         });
-        self.sessions.push(Session { who, party, inbox, frames, dropped });
+        self.sessions.push(Session { who, party, inbox, frames, dropped, line });
         Ok(())
     }
 
@@ -153,11 +159,20 @@ impl Hub {
     pub(crate) fn choose(&self, holder: &str) -> Option<(Format, bool)> {
         let choice = Choice::of(self.sessions.iter().map(|session| &session.party), holder)?;
         self.told.send_if_modified(|told| {
-            let differs = told.chosen_by != choice.account;
+            let pilot = if choice.flies { choice.since } else { 0 };
+            let differs = told.chosen_by != choice.account || told.pilot != pilot;
             told.chosen_by.clone_from(&choice.account);
+            told.pilot = pilot;
             differs
         });
-        Some((choice.format, choice.flies))
+        let flying = |session: &&Session| choice.flies && session.party.since == choice.since;
+        let pilot = self.sessions.iter().find(flying).and_then(|session| session.line.bits());
+        let lines = self.sessions.iter().filter_map(|session| {
+            session.line.bits().map(|bits| (bits, session.line.left_out.load(Ordering::Relaxed)))
+        });
+        let wished = choice.format.bitrate.min(self.config.bitrate_most);
+        let bitrate = for_all(wished, self.config.bitrate_least, pilot, lines);
+        Some((Format { bitrate, ..choice.format }, choice.flies))
     }
 
     pub(crate) fn viewers(&self) -> usize {

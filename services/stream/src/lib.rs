@@ -3,18 +3,25 @@
 //!
 //! There is one encoder. What it encodes is decided by one viewer ([`Choice`]): whoever holds the sticks, or else whoever
 //! has watched for longest; the others are told. Each viewer has a task and a short queue of its own ([`session`]): one that is
-//! slow loses frames and gets a key frame, and nobody else notices.
+//! slow loses frames and gets a key frame, and nobody else notices. The bitrate follows the worst of the lines that have a say
+//! ([`Line`]); the pilot's decides alone.
 
 mod choice;
 mod config;
 mod feedback;
 mod hub;
+mod line;
 mod message;
 mod peer;
+mod rate;
+mod reports;
 mod service;
 mod session;
+mod viewer;
 
 pub use choice::{Choice, Party};
 pub use config::{IceServer, StreamConfig};
+pub use line::{Line, for_all};
 pub use message::{Call, Candidate, FromViewer, Mode, ToViewer};
+pub use rate::{Bounds, Rate, Report};
 pub use service::Stream;

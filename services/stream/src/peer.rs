@@ -1,6 +1,8 @@
 //! One connection to a browser: made, described, and fed with packets.
 
 use crate::feedback::{KeyRequests, SLOT};
+use crate::rate::Report;
+use crate::reports::{self, Reports};
 use crate::{Candidate, Mode, StreamConfig};
 use bytes::Bytes;
 use rtc::interceptor::Slot;
@@ -15,7 +17,7 @@ use rtc::rtp_transceiver::rtp_sender::{
 };
 use std::sync::Arc;
 use std::time::Instant;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use webrtc::error::Error;
 use webrtc::media_stream::track_local::static_rtp::TrackLocalStaticRTP;
 use webrtc::media_stream::track_local::{TrackLocal, TrackLocalEvent};
@@ -83,12 +85,13 @@ pub(crate) struct Peer {
 }
 
 impl Peer {
-    /// Sets a connection up. `number` gives it its stream numbers.
+    /// Sets a connection up. `number` gives it its stream numbers; `reports` gets what the viewer says of its line.
     pub(crate) async fn new(
         config: &StreamConfig,
         mode: Mode,
         number: u64,
         events: mpsc::Sender<Event>,
+        reports: watch::Sender<Option<Report>>,
     ) -> Result<Self, Error> {
         let mut media = MediaEngine::default();
         for (mime, fmtp, payload_type) in
@@ -102,7 +105,10 @@ impl Peer {
             None,
         )?;
         let registry = register_default_interceptors(Registry::new(), &mut media)?;
-        let registry = registry.with(Slot::from(SLOT), KeyRequests::default());
+        let ssrc = (runtime::mix_seed(number, 1) as u32) | 1;
+        let registry = registry
+            .with(Slot::from(SLOT), KeyRequests::default())
+            .with(Slot::from(reports::SLOT), Reports::new(ssrc, reports));
         let servers = config.servers.iter().map(|server| RTCIceServer {
             urls: server.urls.clone(),
             username: server.username.clone(),
@@ -136,7 +142,6 @@ impl Peer {
             .build()
             .await?;
         let connection: Arc<dyn PeerConnection> = Arc::new(connection);
-        let ssrc = (runtime::mix_seed(number, 1) as u32) | 1;
         let track = Arc::new(TrackLocalStaticRTP::new(MediaStreamTrack::new(
             "drone".to_owned(),
             "camera".to_owned(),

@@ -2,6 +2,8 @@
 
 use crate::message::{Offer, Status};
 use crate::peer::{Event, Peer, key_requested};
+use crate::rate::Report;
+use crate::viewer::{LineState, Viewer};
 use crate::{Call, FromViewer, StreamConfig, ToViewer};
 use bytes::Bytes;
 use ipc_types::Format;
@@ -19,10 +21,13 @@ const CONNECT: Duration = Duration::from_secs(20);
 const LOST: Duration = Duration::from_secs(8);
 /// A frame that cannot leave by then is left where it is.
 const SEND: Duration = Duration::from_millis(200);
+/// A viewer that has told nothing of its line for so long is gone, whatever its connection says: one over TCP that has stopped
+/// reading looks connected for a quarter of an hour.
+const GONE: Duration = Duration::from_secs(30);
+/// The library may be waiting for a line that is full.
+const PATIENCE: Duration = Duration::from_secs(1);
 /// Candidates that one session may name.
 const CANDIDATES: usize = 64;
-/// Key frames are asked for once in so long by one viewer.
-const KEY_PAUSE: Duration = Duration::from_millis(300);
 
 /// An encoded frame on its way to viewers.
 #[derive(Clone, Debug)]
@@ -37,12 +42,16 @@ pub(crate) struct Unit {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Told {
     pub chosen_by: String,
+    /// Number of the session of whoever holds the sticks; 0 for nobody.
+    pub pilot: u64,
 }
 
 /// The ends that a session holds.
 pub(crate) struct Ends {
     pub config: Arc<StreamConfig>,
     pub number: u64,
+    /// Counts sessions.
+    pub since: u64,
     /// From the viewer.
     pub inbox: mpsc::Receiver<FromViewer>,
     /// To the viewer.
@@ -53,21 +62,31 @@ pub(crate) struct Ends {
     pub key_requests: Arc<AtomicU64>,
     /// Frames that found this viewer's queue full.
     pub dropped: Arc<AtomicU64>,
+    pub line: Arc<LineState>,
 }
 
 /// Runs a session to its end; the sentence says why it ended.
 pub(crate) async fn run(call: Call, mut ends: Ends) -> String {
     let (events, mut heard) = mpsc::channel(64);
-    let mut peer = match Peer::new(&ends.config, call.mode, ends.number, events).await {
+    let (tell, mut reports) = watch::channel(None);
+    let mut peer = match Peer::new(&ends.config, call.mode, ends.number, events, tell).await {
         Ok(peer) => peer,
         Err(error) => return format!("no connection can be set up: {error}"),
     };
-    let why = talk(&mut peer, &mut ends, &mut heard).await;
-    peer.close().await;
+    let mut viewer = Viewer::new(&call, &ends);
+    let why = talk(&mut peer, &mut ends, &mut heard, &mut reports, &mut viewer).await;
+    // What cannot be closed in time is waiting for a line that is full, and ends with it.
+    let _ = timeout(PATIENCE, peer.close()).await;
     why
 }
 
-async fn talk(peer: &mut Peer, ends: &mut Ends, heard: &mut mpsc::Receiver<Event>) -> String {
+async fn talk(
+    peer: &mut Peer,
+    ends: &mut Ends,
+    heard: &mut mpsc::Receiver<Event>,
+    reports: &mut watch::Receiver<Option<Report>>,
+    viewer: &mut Viewer,
+) -> String {
     match peer.offer().await {
         Ok(sdp) => {
             let offer = Offer { sdp, servers: ends.config.servers.clone() };
@@ -79,12 +98,10 @@ async fn talk(peer: &mut Peer, ends: &mut Ends, heard: &mut mpsc::Receiver<Event
     }
     let track = peer.track();
     let mut second = interval(Duration::from_secs(1));
-    let (mut deadline, mut connected) = (Some(Instant::now() + CONNECT), false);
-    let (mut needs_key, mut asked) = (true, None::<Instant>);
+    let mut deadline = Some(Instant::now() + CONNECT);
     let (mut candidates, mut answered, mut listening) = (0, false, true);
     let mut early = Vec::new();
     let mut last = None::<Arc<Unit>>;
-    let mut lost = 0;
     loop {
         let overdue = async {
             match deadline {
@@ -97,7 +114,10 @@ async fn talk(peer: &mut Peer, ends: &mut Ends, heard: &mut mpsc::Receiver<Event
             message = ends.inbox.recv() => match message {
                 None => return "the drone stops".to_owned(),
                 Some(FromViewer::HangUp(reason)) => return reason.reason,
-                Some(FromViewer::Call(call)) => peer.set_mode(call.mode),
+                Some(FromViewer::Call(call)) => {
+                    peer.set_mode(call.mode);
+                    viewer.wants(&call, ends);
+                }
                 Some(FromViewer::Answer(answer)) => {
                     if answered {
                         let _ = ends.say.try_send(ToViewer::error("this session has had its answer"));
@@ -129,54 +149,54 @@ async fn talk(peer: &mut Peer, ends: &mut Ends, heard: &mut mpsc::Receiver<Event
                     let _ = ends.say.send(ToViewer::Candidate(candidate)).await;
                 }
                 Some(Event::State(State::Connected)) => {
-                    (deadline, connected, needs_key, listening) = (None, true, true, true);
-                    ends.key_requests.fetch_add(1, Ordering::Relaxed);
+                    (deadline, listening) = (None, true);
+                    viewer.connected(ends);
                 }
                 Some(Event::State(State::Failed | State::Closed)) => return "the connection has ended".to_owned(),
                 Some(Event::State(State::Disconnected)) => deadline = Some(Instant::now() + LOST),
                 Some(Event::State(_)) => {}
             },
-            more = key_requested(&track), if connected && listening => {
+            more = key_requested(&track), if viewer.is_connected() && listening => {
                 // A track that is not bound hears nothing; the connection's own state says when it has ended.
                 listening = more;
-                if more && asked.is_none_or(|at| at.elapsed() >= KEY_PAUSE) {
-                    asked = Some(Instant::now());
-                    ends.key_requests.fetch_add(1, Ordering::Relaxed);
+                if more {
+                    viewer.ask_for_key(ends);
+                }
+            },
+            Ok(()) = reports.changed() => {
+                let report = *reports.borrow_and_update();
+                if let Some(report) = report {
+                    viewer.reported(&report, ends);
                 }
             },
             unit = ends.frames.recv() => {
                 let Some(unit) = unit else { return "the drone stops".to_owned() };
-                let before = std::mem::replace(&mut lost, ends.dropped.load(Ordering::Relaxed));
-                if lost != before {
-                    needs_key = true;
-                    if asked.is_none_or(|at| at.elapsed() >= KEY_PAUSE) {
-                        asked = Some(Instant::now());
-                        ends.key_requests.fetch_add(1, Ordering::Relaxed);
-                    }
-                }
-                if !connected || (needs_key && !unit.key) {
+                if !viewer.gets(&unit, ends) {
                     continue;
                 }
-                needs_key = false;
                 // A line that is full: what is late is left out, and the viewer goes on with the next key frame.
                 if !matches!(timeout(SEND, peer.send(&unit.bytes, unit.capture_ns)).await, Ok(Ok(()))) {
                     ends.dropped.fetch_add(1, Ordering::Relaxed);
-                    needs_key = true;
                 }
                 last = Some(unit);
             },
-            _ = second.tick() => if let Some(unit) = &last {
-                let status = Status {
-                    width: unit.format.width,
-                    height: unit.format.height,
-                    fps: unit.format.fps,
-                    bitrate: unit.format.bitrate,
-                    path: peer.path().await,
-                    chosen_by: ends.told.borrow().chosen_by.clone(),
-                    age_ms: (runtime::monotonic_ns().saturating_sub(unit.capture_ns) / 1_000_000) as u32,
-                    dropped: ends.dropped.load(Ordering::Relaxed),
-                };
-                let _ = ends.say.try_send(ToViewer::Status(status));
+            _ = second.tick() => {
+                if viewer.silence(ends) > GONE {
+                    return "nothing was heard of the viewer's line".to_owned();
+                }
+                if let Some(unit) = &last {
+                    let status = Status {
+                        width: unit.format.width,
+                        height: unit.format.height,
+                        fps: unit.format.fps,
+                        bitrate: unit.format.bitrate,
+                        path: timeout(PATIENCE, peer.path()).await.unwrap_or_default(),
+                        chosen_by: ends.told.borrow().chosen_by.clone(),
+                        age_ms: (runtime::monotonic_ns().saturating_sub(unit.capture_ns) / 1_000_000) as u32,
+                        dropped: ends.dropped.load(Ordering::Relaxed),
+                    };
+                    let _ = ends.say.try_send(ToViewer::Status(status));
+                }
             },
         }
     }

@@ -1,16 +1,19 @@
 //! As much of a drone as has to do with video, and a browser that watches it.
+#![allow(dead_code, reason = "each test needs a part of it")]
+
+pub(crate) mod relay;
+mod server;
+
+use relay::Relay;
+use server::Server;
 
 use ipc_types::{SignalIn, SignalOut, Video};
 use manifest::Manifest;
 use runtime::shm::{Holder, RunDir};
 use runtime::{Input, Output, Tool};
 use serde_json::Value;
-use std::collections::VecDeque;
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 const MANIFEST: &str = r#"
@@ -75,6 +78,8 @@ publishes = ["signal/in"]
 /// Services that run, in the order of their start.
 const RUNNING: [&str; 4] = ["simulator", "scenery", "camera", "stream"];
 const PATIENCE: Duration = Duration::from_secs(120);
+const ONE: &str = include_str!("../page.html");
+const MANY: &str = include_str!("../many.html");
 
 /// What a browser saw.
 pub(crate) struct Watched(pub(crate) Value);
@@ -96,7 +101,17 @@ pub(crate) fn quantile(values: &[f64], share: f64) -> f64 {
     sorted.get(index).copied().unwrap_or(f64::NAN)
 }
 
+/// What the drone has done when the page marked something.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct State {
+    /// Frames that were encoded so far.
+    pub(crate) encoded: u64,
+    /// Memory of the stream's process.
+    pub(crate) memory_kib: u64,
+}
+
 pub(crate) struct Drone {
+    encoded: u64,
     run_dir: RunDir,
     manifest_file: PathBuf,
     running: Vec<(&'static str, Child)>,
@@ -153,6 +168,7 @@ impl Drone {
             videos,
             kill: None,
             incarnation: 0,
+            encoded: 0,
         };
         for service in RUNNING {
             drone.spawn(service);
@@ -179,7 +195,36 @@ impl Drone {
 
     /// Has a browser watch with these options of the page.
     pub(crate) fn watch(&mut self, options: &str) -> Watched {
-        let server = Server::start();
+        self.watch_through(ONE, options, PATIENCE, &[], |_, _| {})
+    }
+
+    /// The same with a relay between browser and drone.
+    pub(crate) fn watch_behind(&mut self, relay: &Relay, options: &str) -> Watched {
+        self.watch_through(ONE, options, PATIENCE, &[(0, relay)], |_, _| {})
+    }
+
+    /// Has a browser watch many times at once for so many seconds, each viewer that has a number among `relays` behind that
+    /// one. `mark` hears how far the page is.
+    pub(crate) fn watch_many(
+        &mut self,
+        viewers: usize,
+        seconds: u64,
+        relays: &[(usize, &Relay)],
+        mark: impl FnMut(&str, State),
+    ) -> Watched {
+        let options = format!("viewers={viewers}&seconds={seconds}");
+        self.watch_through(MANY, &options, PATIENCE + Duration::from_secs(seconds), relays, mark)
+    }
+
+    fn watch_through(
+        &mut self,
+        page: &'static str,
+        options: &str,
+        patience: Duration,
+        relays: &[(usize, &Relay)],
+        mut mark: impl FnMut(&str, State),
+    ) -> Watched {
+        let server = Server::start(page);
         let profile = tempfile::tempdir().unwrap();
         let mut browser = Command::new("chromium")
             .args([
@@ -205,15 +250,18 @@ impl Drone {
         let began = Instant::now();
         let mut first_video = None;
         let result = loop {
-            assert!(began.elapsed() < PATIENCE, "the browser did not report");
-            self.turn(&server, &session, &mut first_video);
+            assert!(began.elapsed() < patience, "the browser did not report");
+            self.turn(&server, &session, relays, &mut first_video);
+            while let Ok(how_far) = server.marks.try_recv() {
+                mark(&how_far, State { encoded: self.encoded, memory_kib: self.memory_kib() });
+            }
             if let Ok(result) = server.results.try_recv() {
                 break result;
             }
             std::thread::sleep(Duration::from_millis(1));
         };
         for _ in 0..100 {
-            self.turn(&server, &session, &mut first_video);
+            self.turn(&server, &session, relays, &mut first_video);
             std::thread::sleep(Duration::from_millis(1));
         }
         let _ = browser.kill();
@@ -221,24 +269,33 @@ impl Drone {
         Watched(serde_json::from_str(&result).unwrap())
     }
 
-    fn turn(&mut self, server: &Server, session: &str, first_video: &mut Option<Instant>) {
+    fn turn(
+        &mut self,
+        server: &Server,
+        session: &str,
+        relays: &[(usize, &Relay)],
+        first_video: &mut Option<Instant>,
+    ) {
         self.tool.tick();
         self.holder.keep();
-        while let Ok(said) = server.said.try_recv() {
-            let mut loan = self.signals.loan().unwrap();
-            loan.session.set(session);
-            loan.certificate.set("desk");
-            loan.account.set("ana");
-            loan.role.set("viewer");
-            loan.body.set(&said);
-            loan.send();
-        }
-        while let Some(reply) = self.replies.receive() {
-            if reply.session.as_str() == session {
-                server.outbox.lock().unwrap().push_back(reply.body.as_str().to_owned());
+        let relay_of =
+            |viewer: usize| relays.iter().find(|(number, _)| *number == viewer).map(|(_, relay)| *relay);
+        while let Ok((viewer, said)) = server.said.try_recv() {
+            if relay_of(viewer).is_none() || Relay::to_drone(&said) {
+                self.say(&format!("{session}-{viewer}"), &said);
             }
         }
+        while let Some(reply) = self.replies.receive() {
+            let number = reply.session.as_str().strip_prefix(session).and_then(|rest| rest.strip_prefix('-'));
+            let Some(viewer) = number.and_then(|number| number.parse().ok()) else { continue };
+            let text = match relay_of(viewer) {
+                Some(relay) => relay.to_browser(reply.body.as_str()),
+                None => Some(reply.body.as_str().to_owned()),
+            };
+            server.outbox.lock().unwrap().extend(text.map(|text| (viewer, text)));
+        }
         while self.videos.receive().is_some() {
+            self.encoded += 1;
             first_video.get_or_insert_with(Instant::now);
         }
         if let (Some((service, after_s)), Some(first)) = (self.kill, *first_video)
@@ -253,6 +310,47 @@ impl Drone {
             self.incarnation += 1;
             self.spawn(service);
         }
+    }
+
+    /// Says something in a session.
+    pub(crate) fn say(&mut self, session: &str, body: &str) {
+        let mut loan = self.signals.loan().unwrap();
+        loan.session.set(session);
+        loan.certificate.set("desk");
+        loan.account.set("ana");
+        loan.role.set("viewer");
+        loan.body.set(body);
+        loan.send();
+    }
+
+    /// The next thing that is said in a session, within a while.
+    pub(crate) fn hear(&mut self, session: &str) -> Option<Value> {
+        let until = Instant::now() + Duration::from_secs(10);
+        while Instant::now() < until {
+            self.tool.tick();
+            self.holder.keep();
+            while let Some(reply) = self.replies.receive() {
+                if reply.session.as_str() == session {
+                    return Some(serde_json::from_str(reply.body.as_str()).unwrap());
+                }
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        None
+    }
+
+    /// Whether a service is the process that was started.
+    pub(crate) fn lives(&mut self, service: &str) -> bool {
+        let (_, child) = self.running.iter_mut().find(|(name, _)| *name == service).unwrap();
+        child.try_wait().unwrap().is_none()
+    }
+
+    /// Memory of the stream's process that is in use.
+    fn memory_kib(&self) -> u64 {
+        let (_, child) = self.running.iter().find(|(name, _)| *name == "stream").unwrap();
+        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+        line.trim().trim_end_matches(" kB").parse().unwrap()
     }
 
     /// Asserts that within two seconds nothing is encoded any more, as nobody watches.
@@ -281,89 +379,5 @@ impl Drop for Drone {
             let _ = child.wait();
         }
         self.holder.cleanup_dead_nodes();
-    }
-}
-
-/// Serves the page and carries its messages.
-struct Server {
-    address: std::net::SocketAddr,
-    said: mpsc::Receiver<String>,
-    results: mpsc::Receiver<String>,
-    outbox: Arc<Mutex<VecDeque<String>>>,
-}
-
-impl Server {
-    fn start() -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = listener.local_addr().unwrap();
-        let (say, said) = mpsc::channel();
-        let (done, results) = mpsc::channel();
-        let outbox = Arc::new(Mutex::new(VecDeque::new()));
-        let shared = Arc::clone(&outbox);
-        std::thread::spawn(move || {
-            for stream in listener.incoming().flatten() {
-                let (say, done, outbox) = (say.clone(), done.clone(), Arc::clone(&shared));
-                std::thread::spawn(move || serve(stream, &say, &done, &outbox));
-            }
-        });
-        Self { address, said, results, outbox }
-    }
-}
-
-fn serve(
-    stream: TcpStream,
-    say: &mpsc::Sender<String>,
-    done: &mpsc::Sender<String>,
-    outbox: &Mutex<VecDeque<String>>,
-) {
-    let _ = stream.set_nodelay(true);
-    let mut writer = stream.try_clone().unwrap();
-    let mut reader = BufReader::new(stream);
-    loop {
-        let mut request = String::new();
-        if reader.read_line(&mut request).unwrap_or(0) == 0 {
-            return;
-        }
-        let mut length = 0;
-        loop {
-            let mut line = String::new();
-            if reader.read_line(&mut line).unwrap_or(0) == 0 {
-                return;
-            }
-            if line.trim().is_empty() {
-                break;
-            }
-            if let Some(value) = line.to_lowercase().strip_prefix("content-length:") {
-                length = value.trim().parse().unwrap();
-            }
-        }
-        let mut body = vec![0; length];
-        if reader.read_exact(&mut body).is_err() {
-            return;
-        }
-        let body = String::from_utf8(body).unwrap();
-        let path = request.split(' ').nth(1).unwrap_or("/").to_owned();
-        let (kind, text) = match path.split('?').next().unwrap_or("/") {
-            "/clock" => ("text/plain", (runtime::monotonic_ns() / 1000).to_string()),
-            "/say" => {
-                let _ = say.send(body);
-                ("text/plain", String::new())
-            }
-            "/result" => {
-                let _ = done.send(body);
-                ("text/plain", String::new())
-            }
-            "/poll" => {
-                std::thread::sleep(Duration::from_millis(10));
-                let all: Vec<String> = outbox.lock().unwrap().drain(..).collect();
-                ("application/json", format!("[{}]", all.join(",")))
-            }
-            _ => ("text/html", include_str!("../page.html").to_owned()),
-        };
-        let head =
-            format!("HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n\r\n", text.len());
-        if writer.write_all((head + &text).as_bytes()).is_err() {
-            return;
-        }
     }
 }
