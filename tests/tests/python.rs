@@ -36,7 +36,7 @@ fn python(directory: &Path, examples: &Path) -> PathBuf {
 }
 
 #[test]
-fn the_examples_follow_the_pose_and_start_a_round() {
+fn the_examples_follow_the_pose_save_a_picture_and_start_a_round() {
     let examples = checkout().join("deploy/examples");
     let directory = tempfile::tempdir().unwrap();
     let python = python(directory.path(), &examples);
@@ -54,6 +54,18 @@ fn the_examples_follow_the_pose_and_start_a_round() {
     let said = text(&followed.stdout);
     assert!(followed.status.success(), "{}", text(&followed.stderr));
     assert_eq!(said.lines().filter(|line| line.starts_with("sereno-1: x ")).count(), 5, "{said}");
+
+    let saved = run("save_picture.py", "viewer", "seen.jpg");
+    assert!(saved.status.success(), "{}", text(&saved.stderr));
+    let said = text(&saved.stdout);
+    assert!(said.starts_with("sereno-1: 640x480, ") && said.trim().ends_with("s old: seen.jpg"), "{said}");
+    let file = std::fs::read(directory.path().join("seen.jpg")).unwrap();
+    let picture = image::load_from_memory_with_format(&file, image::ImageFormat::Jpeg).unwrap().to_luma8();
+    assert_eq!(picture.dimensions(), (640, 480));
+    let (least, most) = picture.pixels().fold((255, 0), |(least, most), pixel| {
+        (pixel.0[0].min(least), pixel.0[0].max(most))
+    });
+    assert!(most - least > 60, "a room, not a grey wall: {least} to {most}");
 
     let refused = run("start_round.py", "viewer", "1");
     assert_eq!(refused.status.code(), Some(1));

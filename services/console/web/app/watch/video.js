@@ -2,10 +2,12 @@
 
 import { socketUrl } from "../net/api.js";
 import { Socket } from "../net/socket.js";
+import { Decoder, hasH264, takesH264 } from "../pure/decoding.js";
 import { h, icon, iconButton, setData, setText, show } from "../view/dom.js";
 import { sentence } from "../words/sentences.js";
 import { number, t } from "../words/text.js";
 import { ageWords } from "./situation.js";
+import { Stills } from "./still.js";
 
 const SIZES = [{ width: 640, height: 480, fps: 30 }, { width: 1280, height: 720, fps: 15 }, { width: 1920, height: 1080, fps: 15 }];
 /** Without an offer for so long there is no video from this drone; it is asked for again after a while. */
@@ -13,8 +15,11 @@ const PATIENCE_MS = 5000;
 const AGAIN_MS = 20_000;
 /** The buffer against jitter in watch mode; none is asked for in pilot mode. */
 const WATCH_BUFFER_MS = 100;
-/** A picture older than this stands still. */
+/** A picture older than this stands still; a still may be older. */
 const FROZEN_MS = 1000;
+const STILL_OLD_MS = 4000;
+/** The decoder is looked at so often. */
+const LOOK_MS = 1000;
 const KEY = "sereno.video";
 
 function kept() {
@@ -32,6 +37,8 @@ export class VideoPanel {
     Object.assign(this, kept());
     this.video = h("video", { autoplay: true, playsinline: true, muted: true, "aria-label": t("video.name") });
     this.video.muted = true;
+    this.image = h("img", { alt: t("video.still.name"), hidden: true });
+    this.stills = new Stills(session.drone, this.image, (why) => this.stillTold(why));
     this.words = h("p", {});
     this.cover = h("div", { class: "video-cover", role: "status" }, icon("video-off"), this.words);
     this.age = h("span", { class: "chip video-age", hidden: true });
@@ -46,7 +53,7 @@ export class VideoPanel {
     } }, t(`video.${mode}`)));
     const full = iconButton(t("video.full"), "full", { onclick: () => this.video.requestFullscreen?.().catch(() => {}) });
     this.element = h("section", { class: "panel video-panel", "aria-label": t("video.name") },
-      h("div", { class: "video-stage" }, this.video, this.cover, this.age),
+      h("div", { class: "video-stage" }, this.video, this.image, this.cover, this.age),
       h("div", { class: "video-bar" }, h("div", { class: "segments", role: "group", "aria-label": t("video.mode") }, this.modes), this.choice, this.path, full));
     this.frameAt = null;
     this.delay = 0;
@@ -55,7 +62,9 @@ export class VideoPanel {
     this.socket = new Socket(socketUrl("signal", session.drone), {
       open: () => this.call(),
       text: (text) => this.heard(text),
-      closed: () => this.drop("calling"),
+      closed: () => {
+        if (this.state !== "still") this.drop("calling");
+      },
     });
     this.frames();
     this.reflect();
@@ -70,7 +79,10 @@ export class VideoPanel {
     this.reflect();
     clearTimeout(this.timer);
     this.tuneBuffer();
-    if (!window.RTCPeerConnection) return this.drop("unable");
+    if (!window.RTCPeerConnection) return this.showStills("unable");
+    if (!hasH264(window.RTCRtpReceiver?.getCapabilities?.("video"))) return this.showStills("codec");
+    this.stills.stop();
+    if (this.state === "still") this.set("calling");
     if (!this.socket.send({ call: { ...SIZES[this.size], mode: this.mode } })) return;
     if (this.peer) return;
     if (this.state !== "none") this.set("calling");
@@ -106,6 +118,7 @@ export class VideoPanel {
     peer.ontrack = ({ track, streams }) => {
       this.video.srcObject = streams[0] ?? new MediaStream([track]);
       this.video.play().catch(() => {});
+      this.lookAt(peer);
       this.tuneBuffer();
     };
     peer.onicecandidate = ({ candidate }) => {
@@ -121,11 +134,34 @@ export class VideoPanel {
     };
     await peer.setRemoteDescription({ type: "offer", sdp });
     const answer = await peer.createAnswer();
+    if (!takesH264(answer.sdp)) return this.showStills("codec");
     await peer.setLocalDescription(answer);
     if (this.peer !== peer) return;
     this.socket.send({ answer: { sdp: answer.sdp } });
-    if (!/H264|VP8/i.test(answer.sdp)) this.set("codec");
     for (const candidate of this.early.splice(0)) await peer.addIceCandidate(candidate);
+  }
+  /** Video that comes and is not decoded is no video: stills then. */
+  lookAt(peer) {
+    const decoder = new Decoder();
+    clearInterval(this.looking);
+    this.looking = setInterval(async () => {
+      if (this.peer !== peer) return;
+      for (const entry of (await peer.getStats()).values()) {
+        if (entry.type === "inbound-rtp" && decoder.isStuck(entry, performance.now())) return this.showStills("stuck");
+      }
+    }, LOOK_MS);
+  }
+  /** No video in this browser: one picture a second, and why. */
+  showStills(why) {
+    if (this.peer) this.socket.send({ hang_up: { reason: `no video in this browser: ${why}` } });
+    this.drop("still");
+    this.why = why;
+    setText(this.path, t(`video.still.${why}`));
+    this.stills.start();
+  }
+  stillTold(why) {
+    this.reason = why;
+    this.reflect();
   }
   async candidate(candidate) {
     if (!this.peer) return;
@@ -134,6 +170,7 @@ export class VideoPanel {
   }
   /** Ended by the drone, for a reason that may have gone: it is called again after a while. */
   hungUp(reason) {
+    if (this.state === "still") return;
     this.drop("hung_up", reason);
     this.timer = setTimeout(() => this.call(), AGAIN_MS);
   }
@@ -174,22 +211,27 @@ export class VideoPanel {
   }
   reflect() {
     setData(this.element, "state", this.state);
-    show(this.cover, this.state !== "live");
+    const still = this.state === "still" && this.stills.takenAt !== null;
+    show(this.video, this.state !== "still");
+    show(this.image, still);
+    show(this.cover, this.state !== "live" && !still);
     setText(this.words, this.reason ? `${t(`video.state.${this.state}`)} ${sentence(this.reason)}` : t(`video.state.${this.state}`));
     this.modes.forEach((element, k) => element.setAttribute("aria-pressed", String(this.mode === ["watch", "pilot"][k])));
   }
   update(now) {
+    const still = this.state === "still" && this.stills.takenAt !== null;
     const live = this.state === "live" && this.frameAt !== null;
-    show(this.age, live);
-    if (!live) return;
-    const age = now - this.frameAt + this.delay;
-    const frozen = now - this.frameAt > FROZEN_MS;
+    show(this.age, live || still);
+    if (!live && !still) return;
+    const age = still ? now - this.stills.takenAt : now - this.frameAt + this.delay;
+    const frozen = still ? age > STILL_OLD_MS : now - this.frameAt > FROZEN_MS;
     setData(this.element, "frozen", frozen);
     setText(this.age, frozen ? t("video.frozen", { age: ageWords(age) }) : t("video.age", { age: ageWords(age) }));
   }
   close() {
     const { peer } = this;
     this.peer = null;
+    clearInterval(this.looking);
     peer?.close();
     this.video.srcObject = null;
     this.frameAt = null;
@@ -204,6 +246,7 @@ export class VideoPanel {
     this.ended = true;
     if (this.peer) this.socket.send({ hang_up: { reason: "closed" } });
     clearTimeout(this.timer);
+    this.stills.stop();
     this.close();
     this.socket.end();
   }
