@@ -141,7 +141,8 @@ pub fn picture_of_plan(plan: &Plan) -> Result<Vec<u8>, PlanError> {
 }
 
 fn check(reading: &Reading) -> Result<(), PlanError> {
-    let fail = |field: &str, value: &dyn ToString, allowed| Err(PlanError::range(NAME, field, value, allowed));
+    let fail =
+        |field: &str, value: &dyn ToString, allowed| Err(PlanError::range(NAME, field, value, allowed));
     if !(0.0005..=0.5).contains(&reading.metres_per_pixel) {
         return fail("metres_per_pixel", &reading.metres_per_pixel, "0.0005 to 0.5 m");
     }
@@ -200,8 +201,7 @@ impl Raster {
                 (((k as f64 + 0.5) * DRAWN_CELL_M / pixel) as usize).min(most.saturating_sub(1))
             };
             for (index, cell) in self.dark.iter_mut().enumerate() {
-                let (x, y) =
-                    (of(index % self.width, drawing.width), of(index / self.width, drawing.height));
+                let (x, y) = (of(index % self.width, drawing.width), of(index / self.width, drawing.height));
                 *cell = dark(x, drawing.height - 1 - y);
             }
         }
@@ -263,9 +263,8 @@ impl Raster {
 
     fn around(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
         let (x, y, width, height) = (cell % self.width, cell / self.width, self.width, self.height);
-        (y.saturating_sub(1)..=(y + 1).min(height - 1)).flat_map(move |ny| {
-            (x.saturating_sub(1)..=(x + 1).min(width - 1)).map(move |nx| ny * width + nx)
-        })
+        (y.saturating_sub(1)..=(y + 1).min(height - 1))
+            .flat_map(move |ny| (x.saturating_sub(1)..=(x + 1).min(width - 1)).map(move |nx| ny * width + nx))
     }
 
     /// What can be reached from `start` over the sides of cells.

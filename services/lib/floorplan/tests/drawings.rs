@@ -1,9 +1,7 @@
 //! Drawings become plans: scale, thin lines, outside, and what is no building.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests")]
 
-use floorplan::{
-    Cell, Drawing, Pad, Plan, PlanError, PlanHeader, Reading, picture_of_plan, plan_of_drawing,
-};
+use floorplan::{Cell, Drawing, Pad, Plan, PlanError, PlanHeader, Reading, picture_of_plan, plan_of_drawing};
 
 const RADIUS_M: f32 = 0.2;
 
@@ -82,7 +80,10 @@ fn the_origin_is_the_lower_left_corner_of_the_picture() {
     let plan = make(&HOUSE, 1, &moved, pad(-8.4, 6.4)).unwrap();
     assert_eq!(plan.origin(), (-10.0, 5.0));
     assert_eq!(plan.cell_at(-8.4, 6.4), Cell::Free);
-    assert_eq!(sentence(make(&HOUSE, 1, &moved, pad(1.6, 1.4))), "the pad at (1.60, 1.40) is outside the plan: it must stand in free space");
+    assert_eq!(
+        sentence(make(&HOUSE, 1, &moved, pad(1.6, 1.4))),
+        "the pad at (1.60, 1.40) is outside the plan: it must stand in free space"
+    );
 }
 
 #[test]
@@ -110,7 +111,11 @@ fn a_line_one_pixel_wide_keeps_the_outside_out() {
     let plan = plan_of_drawing(&drawing, &reading(scale), &pad(2.5, 2.5), RADIUS_M).unwrap();
     // A square on its corner with a diagonal of 500 pixels.
     let area = 0.5 * (500.0 * scale).powi(2);
-    assert!(f64::from(plan.free_area()) < area && f64::from(plan.free_area()) > 0.85 * area, "{}", plan.free_area());
+    assert!(
+        f64::from(plan.free_area()) < area && f64::from(plan.free_area()) > 0.85 * area,
+        "{}",
+        plan.free_area()
+    );
     assert_eq!(plan.cell_at(0.2, 0.2), Cell::Unknown);
 }
 
@@ -161,25 +166,48 @@ fn what_is_wiped_out_is_no_wall_and_lettering_outside_is_unknown() {
 fn what_is_no_building_is_refused_in_a_sentence() {
     let said = |reading: &Reading, pad| sentence(make(&HOUSE, 1, reading, pad));
     let good = reading(0.2);
-    assert_eq!(said(&good, pad(0.5, 1.4)), "the pad at (0.50, 1.40) is inside a wall: it must stand in free space");
-    assert_eq!(said(&good, pad(f32::NAN, 1.4)), "the pad at (NaN, 1.40) is outside the plan: it must stand in free space");
-    assert!(said(&good, pad(0.8, 1.4)).contains("is 0.20 m from a wall, needed is 0.35 m"), "{}", said(&good, pad(0.8, 1.4)));
+    assert_eq!(
+        said(&good, pad(0.5, 1.4)),
+        "the pad at (0.50, 1.40) is inside a wall: it must stand in free space"
+    );
+    assert_eq!(
+        said(&good, pad(f32::NAN, 1.4)),
+        "the pad at (NaN, 1.40) is outside the plan: it must stand in free space"
+    );
+    assert!(
+        said(&good, pad(0.8, 1.4)).contains("is 0.20 m from a wall, needed is 0.35 m"),
+        "{}",
+        said(&good, pad(0.8, 1.4))
+    );
     // A house for dolls: the vehicle fits nowhere.
     let tiny = said(&reading(0.03), pad(0.21, 0.21));
     assert!(tiny.contains("`free space`") && tiny.contains("is the scale right?"), "{tiny}");
     for (wrong, says) in [
         (reading(0.0), "plan: `metres_per_pixel` is 0, allowed is 0.0005 to 0.5 m"),
         (reading(f64::NAN), "plan: `metres_per_pixel` is NaN, allowed is 0.0005 to 0.5 m"),
-        (Reading { origin: [0.0, 6000.0], ..good.clone() }, "plan: `origin` is 6000, allowed is -5000 to 5000 m"),
-        (Reading { walls: vec![[0.0; 4]; 257], ..good.clone() }, "plan: `walls` is 257 of them, allowed is at most 256"),
-        (Reading { wiped: vec![[0.0, 0.0, f64::INFINITY, 0.0]], ..good.clone() }, "plan: `wiped` is inf, allowed is -10000 to 10000 m"),
+        (
+            Reading { origin: [0.0, 6000.0], ..good.clone() },
+            "plan: `origin` is 6000, allowed is -5000 to 5000 m",
+        ),
+        (
+            Reading { walls: vec![[0.0; 4]; 257], ..good.clone() },
+            "plan: `walls` is 257 of them, allowed is at most 256",
+        ),
+        (
+            Reading { wiped: vec![[0.0, 0.0, f64::INFINITY, 0.0]], ..good.clone() },
+            "plan: `wiped` is inf, allowed is -10000 to 10000 m",
+        ),
     ] {
         assert_eq!(said(&wrong, pad(1.6, 1.4)), says);
     }
     // 500 m x 500 m.
     let wide = vec![255_u8; 1_000 * 1_000];
-    let huge = plan_of_drawing(&Drawing::new(1_000, 1_000, &wide).unwrap(), &reading(0.5), &pad(1.0, 1.0), RADIUS_M);
-    assert_eq!(sentence(huge), "plan: the picture is 10000 x 10000 cells, allowed is 3 to 8192 a side and 16000000 in all");
+    let huge =
+        plan_of_drawing(&Drawing::new(1_000, 1_000, &wide).unwrap(), &reading(0.5), &pad(1.0, 1.0), RADIUS_M);
+    assert_eq!(
+        sentence(huge),
+        "plan: the picture is 10000 x 10000 cells, allowed is 3 to 8192 a side and 16000000 in all"
+    );
     assert!(Drawing::new(3, 3, &[0; 8]).is_err());
     // Lines from far away, and a wall along the whole raster.
     let far = Reading { walls: vec![[-10_000.0, 1.4, 10_000.0, 1.4]], ..good };
