@@ -131,6 +131,7 @@ fn shells_keep_to_their_family() {
                 "getrandom",
                 "hyper",
                 "hyper-util",
+                "image",
                 "ring",
                 "rusqlite",
                 "rustls",
