@@ -2,7 +2,7 @@
 
 use crate::config::BridgeConfig;
 use crate::form::{Form, encoding, type_name};
-use floorplan::{Area, NamedArea, PlanHeader};
+use floorplan::{Area, NamedArea, PlanHeader, Sidecar};
 use ipc_types::{Message, TopicVisitor, visit_topic};
 use runtime::{Start, StartError};
 use serde_json::{Value, json};
@@ -89,6 +89,7 @@ impl About {
                 "origin_x_m": origin_x,
                 "origin_y_m": origin_y,
             },
+            "building": Sidecar { pad: start.pad()?, ..sidecar.clone() },
             "pad": start.pad()?.map(|pad| json!({ "x_m": pad.x, "y_m": pad.y, "heading_rad": pad.heading_rad() })),
             "rooms": areas(&sidecar.rooms),
             "doors": doors,

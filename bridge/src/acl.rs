@@ -55,7 +55,7 @@ impl Rules {
         rules.allow("offers", OUT, &["declare_subscriber", "declare_queryable"], &["sereno/**".to_owned()]);
         for (name, standing) in clients.iter() {
             let Standing::Client(role) = standing else { continue };
-            let orders = commands.command("*", name);
+            let asked = [commands.command("*", name), commands.edit(name)];
             let signals = |direction| commands.signal(name, "*", direction);
             let (ask, answer, say, hear, steer) = (
                 format!("ask {name}"),
@@ -65,9 +65,9 @@ impl Rules {
                 format!("steer {name}"),
             );
             // A viewer may ask too, and is refused in a sentence.
-            rules.allow(&ask, IN, &["query"], std::slice::from_ref(&orders));
-            rules.allow(&answer, OUT, &["reply"], std::slice::from_ref(&orders));
-            rules.allow(&say, IN, &["put"], &[signals(Direction::In)]);
+            rules.allow(&ask, IN, &["query"], &asked);
+            rules.allow(&answer, OUT, &["reply"], &asked);
+            rules.allow(&say, IN, &["put"], &[signals(Direction::In), commands.wish(name)]);
             rules.allow(&hear, IN, &["declare_subscriber"], &[signals(Direction::Out)]);
             rules.allow(&format!("heard {name}"), OUT, &["put"], &[signals(Direction::Out)]);
             let mut bound: Vec<String> = ["see", "seen", "find", "found", "offers"].map(str::to_owned).into();

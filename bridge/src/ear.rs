@@ -1,12 +1,14 @@
 //! What is done at once with what comes in: whoever is not known, too quick or too loud goes no further.
 
 use crate::about::About;
+use crate::edit::{MAX_EDIT, MAX_PICTURE};
 use crate::gate::{Class, Limits};
 use crate::keys::{Keys, part, verb_from_word};
 use crate::network::{Answer, Asker, Heard, HeardSticks, Losses};
 use crate::pending::refusal;
 use crate::roles::Clients;
 use crate::sessions::Hearing;
+use crate::wishes::MAX_WISH;
 use crate::zenoh_config::{MAX_ORDER, MAX_SIGNAL};
 use ipc_types::Verb;
 use runtime::Waker;
@@ -64,7 +66,9 @@ impl Ear {
             Err(error) => {
                 let (TrySendError::Full(heard) | TrySendError::Disconnected(heard)) = error;
                 match heard {
-                    Heard::Order { asker, .. } => self.refuse(asker, "too many orders at once"),
+                    Heard::Order { asker, .. } | Heard::Edit { asker, .. } => {
+                        self.refuse(asker, "too many orders at once")
+                    }
                     _ => self.lose(),
                 }
             }
@@ -109,6 +113,34 @@ impl Hearing for Ear {
         self.hand_over(queue, Heard::Order { certificate: certificate.to_owned(), verb, json, asker });
     }
 
+    fn edit(&self, query: Query) {
+        let key = query.key_expr().as_str().to_owned();
+        let asker = Asker { query, key: key.clone() };
+        let Some(certificate) = part(&key, 3) else {
+            return self.refuse(asker, "this key is no change: sereno/DRONE/edit/CERTIFICATE is");
+        };
+        if !self.knows(certificate) {
+            return self.refuse(asker, "this certificate is not on the drone's list of clients");
+        }
+        if !self.may(certificate, Class::Edit) {
+            return self.refuse(asker, "too many changes: not so fast");
+        }
+        let json = asker.query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default();
+        let picture = asker.query.attachment().map(|picture| picture.to_bytes().into_owned());
+        let size = picture.as_ref().map_or(0, Vec::len);
+        if json.len() > MAX_EDIT || size > MAX_PICTURE {
+            let sentence = format!(
+                "a change of {} bytes and a picture of {size}: allowed are at most {MAX_EDIT} and {MAX_PICTURE}",
+                json.len()
+            );
+            return self.refuse(asker, &sentence);
+        }
+        self.hand_over(
+            &self.others,
+            Heard::Edit { certificate: certificate.to_owned(), json, picture, asker },
+        );
+    }
+
     fn sticks(&self, sample: &Sample) {
         let Some(certificate) = part(sample.key_expr().as_str(), 3) else { return self.lose() };
         let fits = sample.payload().len() <= MAX_ORDER;
@@ -135,6 +167,16 @@ impl Hearing for Ear {
         let json = sample.payload().to_bytes().into_owned();
         let heard = Heard::Signal { certificate: certificate.to_owned(), session: session.to_owned(), json };
         self.hand_over(&self.others, heard);
+    }
+
+    fn wish(&self, sample: &Sample) {
+        let Some(certificate) = part(sample.key_expr().as_str(), 3) else { return self.lose() };
+        let fits = sample.payload().len() <= MAX_WISH;
+        if !(fits && self.knows(certificate) && self.may(certificate, Class::Other)) {
+            return self.lose();
+        }
+        let json = sample.payload().to_bytes().into_owned();
+        self.hand_over(&self.others, Heard::Wish { certificate: certificate.to_owned(), json });
     }
 
     fn newest(&self, query: Query) {

@@ -176,7 +176,9 @@ fn write_patrol(patrol: &Patrol, out: &mut String) -> std::fmt::Result {
         seen_cell_m,
         command_sequence,
         waited_s,
-        answer
+        answer,
+        points_waiting,
+        points_barred
     );
     write_list("waypoints", patrol.waypoints.get(..patrol.waypoints_used as usize).unwrap_or(&[]), out)?;
     write_list("rooms", patrol.rooms.get(..patrol.rooms_used as usize).unwrap_or(&[]), out)?;

@@ -1,5 +1,6 @@
 //! Which orders are given: by whom, how often, how fresh, and none twice. Pure: time is an argument.
 
+use crate::edit::Edit;
 use crate::order::{BEACON_LIFE_NS, Order};
 use crate::roles::{Clients, Role};
 use ipc_types::{COMMAND_LIFE_NS, Command, Text, Verb};
@@ -20,8 +21,10 @@ pub enum Class {
     Order,
     /// Sticks.
     Sticks,
-    /// Questions for the newest message, and messages of video sessions.
+    /// Questions for the newest message, wishes, and messages of video sessions.
     Other,
+    /// Changes of the building.
+    Edit,
 }
 
 impl Class {
@@ -64,6 +67,7 @@ impl Limits {
             Class::Order => self.orders_hz,
             Class::Sticks => self.sticks_hz,
             Class::Other => 200.0,
+            Class::Edit => 2.0,
         };
         let full = Bucket { tokens: hz, filled_ns: now };
         let bucket = self.buckets.entry((certificate.to_owned(), class)).or_insert(full);
@@ -78,7 +82,16 @@ impl Limits {
     }
 }
 
-/// Decides about orders.
+/// By what somebody asks for something.
+#[derive(Debug, Clone, Copy)]
+struct Paper<'a> {
+    certificate: &'a str,
+    claimed: Option<Role>,
+    id: u64,
+    beacon_ns: u64,
+}
+
+/// Decides about orders and changes.
 #[derive(Debug)]
 pub struct Gate {
     clients: Arc<Clients>,
@@ -132,35 +145,8 @@ impl Gate {
         json: &[u8],
     ) -> Result<Command, String> {
         let order = Order::parse(verb, json)?;
-        let Some(role) = self.role(certificate, order.role) else {
-            return Err(format!("the certificate {certificate} is not on the drone's list of clients"));
-        };
-        if role < Role::Guard {
-            return Err(format!("a {} may not order: guard, installer or administrator may", role.word()));
-        }
-        if order.beacon_ns > now || order.beacon_ns < self.first_beacon_ns {
-            return Err(
-                "beacon_ns is no beacon of this drone since it started: give the order again".to_owned()
-            );
-        }
-        let age_ns = now - order.beacon_ns;
-        if age_ns > BEACON_LIFE_NS {
-            return Err(format!(
-                "the order is {:.1} s old: the link is too slow, or it was held back",
-                age_ns as f64 * 1e-9
-            ));
-        }
-        while self.seen.front().is_some_and(|(when, ..)| now.saturating_sub(*when) > BEACON_LIFE_NS) {
-            self.seen.pop_front();
-        }
-        let who = runtime::fnv(certificate.as_bytes());
-        if self.seen.iter().any(|(_, by, id)| (*by, *id) == (who, order.id)) {
-            return Err("the same order came before".to_owned());
-        }
-        if self.seen.len() >= MAX_REMEMBERED {
-            return Err("too many orders at once".to_owned());
-        }
-        self.seen.push_back((now, who, order.id));
+        let paper = Paper { certificate, claimed: order.role, id: order.id, beacon_ns: order.beacon_ns };
+        let role = self.admit(now, &paper, Role::Guard, "order: guard, installer or administrator")?;
         let account = if order.account.as_str().is_empty() { Text::new(certificate) } else { order.account };
         Ok(Command {
             expiry_ns: now.saturating_add(COMMAND_LIFE_NS),
@@ -174,6 +160,64 @@ impl Gate {
             certificate: Text::new(certificate),
             ..Command::default()
         })
+    }
+
+    /// Reads a change of the building that came by `certificate`, with its picture, and decides about it.
+    ///
+    /// # Errors
+    /// One sentence for whoever wants it.
+    pub fn decide_edit(
+        &mut self,
+        now: u64,
+        certificate: &str,
+        json: &[u8],
+        picture: Option<&[u8]>,
+    ) -> Result<Edit, String> {
+        // First: who may not need not be told what was wrong with it, and costs nothing.
+        let own = self.role(certificate, None);
+        if own < Some(Role::Installer) {
+            let word = own.map_or("stranger", Role::word);
+            return Err(format!("a {word} may not change the building: installer or administrator may"));
+        }
+        let edit = Edit::parse(json, picture)?;
+        let paper = Paper { certificate, claimed: edit.role, id: edit.id, beacon_ns: edit.beacon_ns };
+        self.admit(now, &paper, Role::Installer, "change the building: installer or administrator")?;
+        Ok(edit)
+    }
+
+    /// Whether something may be done for who shows this paper: role, freshness, and that it did not come before.
+    fn admit(&mut self, now: u64, paper: &Paper<'_>, least: Role, who: &str) -> Result<Role, String> {
+        let Paper { certificate, claimed, id, beacon_ns } = *paper;
+        let Some(role) = self.role(certificate, claimed) else {
+            return Err(format!("the certificate {certificate} is not on the drone's list of clients"));
+        };
+        if role < least {
+            return Err(format!("a {} may not {who} may", role.word()));
+        }
+        if beacon_ns > now || beacon_ns < self.first_beacon_ns {
+            return Err(
+                "beacon_ns is no beacon of this drone since it started: give the order again".to_owned()
+            );
+        }
+        let age_ns = now - beacon_ns;
+        if age_ns > BEACON_LIFE_NS {
+            return Err(format!(
+                "the order is {:.1} s old: the link is too slow, or it was held back",
+                age_ns as f64 * 1e-9
+            ));
+        }
+        while self.seen.front().is_some_and(|(when, ..)| now.saturating_sub(*when) > BEACON_LIFE_NS) {
+            self.seen.pop_front();
+        }
+        let by = runtime::fnv(certificate.as_bytes());
+        if self.seen.iter().any(|(_, from, seen)| (*from, *seen) == (by, id)) {
+            return Err("the same order came before".to_owned());
+        }
+        if self.seen.len() >= MAX_REMEMBERED {
+            return Err("too many orders at once".to_owned());
+        }
+        self.seen.push_back((now, by, id));
+        Ok(role)
     }
 }
 
@@ -243,6 +287,29 @@ mod tests {
             assert!(error.contains(what), "{error}");
         }
         assert!(gate.decide(now, "administrator", Verb::Land, &order(7, now, "")).is_ok(), "somebody else's");
+    }
+
+    #[test]
+    fn the_building_is_changed_by_installers_and_by_nobody_twice() {
+        let change = |id: u64, more: &str| {
+            let building = "\"building\":{\"pad\":{\"x\":1,\"y\":1}}";
+            format!("{{\"id\":\"{id:016x}\",\"beacon_ns\":{START},{building}{more}}}").into_bytes()
+        };
+        for certificate in Role::ALL {
+            for account in Role::ALL {
+                let json = change(1, &format!(",\"role\":\"{}\"", account.word()));
+                let decided = gate().decide_edit(START, certificate.word(), &json, None);
+                let may = certificate.min(account) >= Role::Installer;
+                assert_eq!(decided.is_ok(), may, "{certificate:?} for {account:?}: {decided:?}");
+            }
+        }
+        let mut gate = gate();
+        assert!(gate.decide_edit(START, "hub", b"junk", None).unwrap_err().contains("a stranger may not"));
+        assert!(gate.decide_edit(START, "installer", &change(7, ""), None).is_ok());
+        let again = gate.decide_edit(START + 1, "installer", &change(7, ""), None).unwrap_err();
+        assert_eq!(again, "the same order came before");
+        let late = gate.decide_edit(START + 3 * SECOND, "installer", &change(8, ""), None).unwrap_err();
+        assert!(late.contains("s old"), "{late}");
     }
 
     #[test]

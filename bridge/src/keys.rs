@@ -57,6 +57,18 @@ impl Keys {
         format!("sereno/{}/sticks/{certificate}", self.drone)
     }
 
+    /// Of what a certificate wishes of the camera.
+    #[must_use]
+    pub fn wish(&self, certificate: &str) -> String {
+        format!("sereno/{}/wish/{certificate}", self.drone)
+    }
+
+    /// Of a certificate's changes of the building.
+    #[must_use]
+    pub fn edit(&self, certificate: &str) -> String {
+        format!("sereno/{}/edit/{certificate}", self.drone)
+    }
+
     /// Of what a certificate says in a video session, or hears.
     #[must_use]
     pub fn signal(&self, certificate: &str, session: &str, direction: Direction) -> String {

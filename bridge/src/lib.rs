@@ -11,6 +11,8 @@ pub mod acl;
 pub mod authority;
 pub mod config;
 mod ear;
+pub mod edit;
+pub mod editor;
 mod files;
 pub mod form;
 pub mod gate;
@@ -27,6 +29,7 @@ mod sessions;
 mod signals;
 mod taps;
 pub mod threads;
+pub mod wishes;
 pub mod x509;
 pub mod zenoh_config;
 

@@ -50,12 +50,30 @@ pub enum Heard {
         /// Who is to be answered.
         asker: Asker,
     },
+    /// A change of the building.
+    Edit {
+        /// By which certificate.
+        certificate: String,
+        /// What is wanted.
+        json: Vec<u8>,
+        /// The picture of a new plan.
+        picture: Option<Vec<u8>>,
+        /// Who is to be answered.
+        asker: Asker,
+    },
     /// A message of a video session.
     Signal {
         /// By which certificate.
         certificate: String,
         /// Which session of it.
         session: String,
+        /// What it says.
+        json: Vec<u8>,
+    },
+    /// A wish for pictures.
+    Wish {
+        /// By which certificate.
+        certificate: String,
         /// What it says.
         json: Vec<u8>,
     },
@@ -243,6 +261,11 @@ fn send(session: &zenoh::Session, put: &Put) {
         .priority(priority)
         .express(matches!(put.pace, Pace::Express | Pace::Reliable))
         .wait();
+}
+
+/// Answers before it returns, for who has a thread to wait on.
+pub(crate) fn reply_now(asker: Asker, answer: &serde_json::Value) {
+    reply(Answer { asker, payload: Some((Encoding::APPLICATION_JSON, answer.to_string().into_bytes())) });
 }
 
 fn reply(answer: Answer) {

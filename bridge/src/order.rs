@@ -64,6 +64,24 @@ pub struct Order {
     pub y_m: f32,
 }
 
+/// The identity of an order or a change.
+pub(crate) fn identity(id: &str) -> Result<u64, String> {
+    if id.len() != 16 || !id.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+        return Err(format!("id = {}: 16 hexadecimal digits are needed", shown(id)));
+    }
+    u64::from_str_radix(id, 16).map_err(|_| "id: no number".to_owned())
+}
+
+/// The role that an account is said to have, if it is said.
+pub(crate) fn claimed_role(word: &str) -> Result<Option<Role>, String> {
+    if word.is_empty() {
+        return Ok(None);
+    }
+    Role::from_word(word)
+        .map(Some)
+        .ok_or_else(|| format!("role = {}: allowed are viewer, guard, installer, administrator", shown(word)))
+}
+
 impl Order {
     /// Reads an order of `verb`.
     ///
@@ -71,16 +89,8 @@ impl Order {
     /// One sentence that names field, value and what is allowed.
     pub fn parse(verb: Verb, json: &[u8]) -> Result<Self, String> {
         let text: OrderText = read("an order", json)?;
-        if text.id.len() != 16 || !text.id.bytes().all(|byte| byte.is_ascii_hexdigit()) {
-            return Err(format!("id = {}: 16 hexadecimal digits are needed", shown(&text.id)));
-        }
-        let id = u64::from_str_radix(&text.id, 16).map_err(|_| "id: no number".to_owned())?;
-        let role = match text.role.as_str() {
-            "" => None,
-            word => Some(Role::from_word(word).ok_or_else(|| {
-                format!("role = {}: allowed are viewer, guard, installer, administrator", shown(word))
-            })?),
-        };
+        let id = identity(&text.id)?;
+        let role = claimed_role(&text.role)?;
         if text.account.len() > LONGEST_ACCOUNT || text.account.chars().any(char::is_control) {
             return Err(format!(
                 "account = {}: at most {LONGEST_ACCOUNT} bytes of text",

@@ -2,6 +2,7 @@
 
 use crate::about::About;
 use crate::config::BridgeConfig;
+use crate::editor::Editor;
 use crate::gate::Gate;
 use crate::keys::Keys;
 use crate::network::{Asker, Heard, Network, Pace};
@@ -9,7 +10,8 @@ use crate::order::{Input as StickInput, parse_sticks};
 use crate::pending::{Pending, refusal};
 use crate::signals::Signals;
 use crate::taps::{self, AnyTap, Pacer, Tap};
-use ipc_types::{Command, Message, Patrol, PilotState, Sticks, Text};
+use crate::wishes::Wishes;
+use ipc_types::{Command, Message, Patrol, PilotState, Sticks, Text, Wish};
 use runtime::{Output, Ports, Service, Start, StartError};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -20,6 +22,11 @@ use zenoh::bytes::Encoding;
 
 /// Topics that do not leave as they are: what goes to one session only, and raw pictures, which are too large.
 const KEPT: [&str; 2] = ["signal/out", "camera/picture"];
+
+/// How often a wish is repeated while it stands.
+const WISH_EVERY_NS: u64 = 100_000_000;
+/// For how long each of them is good: a lost one is no interruption.
+const WISH_GOOD_NS: u64 = 500_000_000;
 
 /// The drone on zenoh.
 pub struct Bridge {
@@ -33,6 +40,11 @@ pub struct Bridge {
     taps: BTreeMap<String, Box<dyn AnyTap>>,
     /// Video sessions, where the system has video.
     signals: Option<Signals>,
+    editor: Editor,
+    wishes: Wishes,
+    /// To the camera, where the system has one, and when the next wish is due.
+    camera: Option<Output<Wish>>,
+    wish_pacer: Pacer,
     beacon: Pacer,
     beacon_key: Arc<str>,
     /// Set at the first step.
@@ -74,6 +86,10 @@ impl Service for Bridge {
             command: ports.output()?,
             sticks: ports.output()?,
             signals: Signals::open(ports, keys.clone())?,
+            camera: ports.may_publish(Wish::TOPIC).then(|| ports.output()).transpose()?,
+            editor: Editor::start(start)?,
+            wishes: Wishes::default(),
+            wish_pacer: Pacer::new(Some(WISH_EVERY_NS)),
             taps,
             gate: Gate::new(Arc::default(), 0),
             pending: Pending::default(),
@@ -93,6 +109,7 @@ impl Service for Bridge {
         self.gate.set_clients(self.network.clients());
         self.hear_sticks(now);
         self.hear(now);
+        self.wish(now);
         self.pass(now);
         self.settle(now);
     }
@@ -148,6 +165,19 @@ impl Bridge {
                         self.answer(asker, &refusal(&sentence));
                     }
                 }
+                Heard::Edit { certificate, json, picture, asker } => {
+                    let decided = self.gate.decide_edit(now, &certificate, &json, picture.as_deref());
+                    let refused = match decided {
+                        Err(sentence) => Some((asker, sentence)),
+                        Ok(edit) => {
+                            self.editor.take(edit, asker).err().map(|(asker, said)| (asker, said.to_owned()))
+                        }
+                    };
+                    if let Some((asker, sentence)) = refused {
+                        self.refused += 1;
+                        self.answer(asker, &refusal(&sentence));
+                    }
+                }
                 Heard::Newest { topic, asker } => {
                     let newest = match topic.as_str() {
                         PilotState::TOPIC => self.pilot.newest(),
@@ -155,6 +185,11 @@ impl Bridge {
                         topic => self.taps.get(topic).and_then(|tap| tap.newest()),
                     };
                     self.network.answer(asker, newest);
+                }
+                Heard::Wish { certificate, json } => {
+                    let known = self.camera.is_some() && self.gate.role(&certificate, None).is_some();
+                    let taken = known && self.wishes.take(now, &certificate, &json).is_ok();
+                    self.refused += u64::from(!taken);
                 }
                 Heard::Signal { certificate, session, json } => {
                     let role = self.gate.role(&certificate, None);
@@ -165,6 +200,16 @@ impl Bridge {
                     self.refused += u64::from(!taken);
                 }
             }
+        }
+    }
+
+    /// Tells the camera what is wished for over the network, while it is.
+    fn wish(&mut self, now: u64) {
+        let Some(camera) = &mut self.camera else { return };
+        if let Some(wish) = self.wishes.wanted(now)
+            && self.wish_pacer.pass(now)
+        {
+            camera.publish(&Wish { expiry_ns: now + WISH_GOOD_NS, ..wish });
         }
     }
 

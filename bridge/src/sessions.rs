@@ -26,10 +26,14 @@ pub(crate) trait Hearing: Send + Sync {
     fn known(&self, clients: Clients);
     /// An order.
     fn order(&self, query: Query);
+    /// A change of the building.
+    fn edit(&self, query: Query);
     /// An input of the sticks.
     fn sticks(&self, sample: &Sample);
     /// A message of a video session.
     fn signal(&self, sample: &Sample);
+    /// A wish for pictures.
+    fn wish(&self, sample: &Sample);
     /// A question for the newest message of a topic.
     fn newest(&self, query: Query);
     /// A question for what the drone is.
@@ -255,11 +259,13 @@ fn session(config: &str, hearing: &Arc<dyn Hearing>) -> Result<Session, String> 
         }};
     }
     queryable!(keys.command("*", "*"), order);
+    queryable!(keys.edit("*"), edit);
     queryable!(keys.telemetry("**"), newest);
     queryable!(keys.about(), about);
     queryable!(keys.plan(), plan);
     subscriber!(keys.sticks("*"), sticks);
     subscriber!(keys.signal("*", "*", Direction::In), signal);
+    subscriber!(keys.wish("*"), wish);
     // Last: who sees the token finds everything else.
     let token = session.liveliness().declare_token(keys.alive()).wait().map_err(said)?;
     // It lives as long as its session.

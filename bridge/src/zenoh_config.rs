@@ -2,13 +2,15 @@
 //! nothing allowed but what stands here.
 
 use crate::acl;
+use crate::edit::{MAX_EDIT, MAX_PICTURE};
 use crate::roles::Clients;
+use crate::wishes::MAX_WISH;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-/// Larger messages are not put together, bytes: nothing that comes to a drone is half as large.
-const MAX_TO_DRONE: u64 = 131_072;
+/// Larger messages are not put together, bytes: the largest that comes to a drone is a change with the picture of a plan.
+const MAX_TO_DRONE: u64 = (MAX_EDIT + MAX_PICTURE + 4096) as u64;
 /// The largest telemetry, a full set of particles, is 1.6 MB.
 const MAX_TO_CLIENT: u64 = 4_194_304;
 /// Longest JSON of an order or sticks, bytes.
@@ -90,13 +92,18 @@ fn set(config: &mut Value, path: &[&str], value: Value) {
     *place = value;
 }
 
-/// Nothing larger than an order is taken on the keys of orders and sticks, nor than 64 KiB on any.
+/// Nothing larger than an order is taken on the keys of orders and sticks, than a wish on those of wishes, nor than 64 KiB on
+/// any.
 fn sizes() -> Value {
     json!([
         { "id": "orders", "flows": ["ingress"], "messages": ["put", "query"], "size_limit": MAX_ORDER,
           "key_exprs": ["sereno/*/command/**", "sereno/*/sticks/**"] },
         { "id": "signals", "flows": ["ingress"], "messages": ["put", "query"], "size_limit": MAX_SIGNAL,
           "key_exprs": ["sereno/*/signal/**"] },
+        { "id": "changes", "flows": ["ingress"], "messages": ["put", "query"],
+          "size_limit": MAX_EDIT + MAX_PICTURE, "key_exprs": ["sereno/*/edit/**"] },
+        { "id": "wishes", "flows": ["ingress"], "messages": ["put", "query"], "size_limit": MAX_WISH,
+          "key_exprs": ["sereno/*/wish/**"] },
     ])
 }
 

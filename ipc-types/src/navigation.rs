@@ -227,6 +227,10 @@ message! {
         pub waited_s: f32,
         /// An [`crate::Answer`] code: what became of the last command.
         pub answer: u32,
+        /// Bit per point that the plan's side file names for the round, in its order: not flown to yet.
+        pub points_waiting: u32,
+        /// Bit per point: not flown to, for there is no way to it.
+        pub points_barred: u32,
         /// The route.
         pub waypoints: [Waypoint; 1024],
         /// The rooms.

@@ -45,6 +45,8 @@ pub(crate) struct Child {
     last_line: String,
     /// Retained topics that the keeper offers to the next start.
     pub(crate) retained: Vec<String>,
+    /// The next start is offered nothing.
+    afresh: bool,
 }
 
 impl Child {
@@ -62,7 +64,25 @@ impl Child {
             killed_because: None,
             last_line: String::new(),
             retained: Vec::new(),
+            afresh: false,
         }
+    }
+
+    /// The next start is offered these topics.
+    pub(crate) fn offer_retained(&mut self, topics: Vec<String>) {
+        for topic in topics {
+            // What was offered before and not replaced is still on offer: a service that dies while it starts finds it
+            // again.
+            if !(self.afresh || self.retained.contains(&topic)) {
+                self.retained.push(topic);
+            }
+        }
+    }
+
+    /// The next start is offered nothing, whatever was kept of this one.
+    pub(crate) fn forget_retained(&mut self) {
+        self.retained.clear();
+        self.afresh = true;
     }
 
     pub(crate) fn pid(&self) -> Option<u32> {
@@ -122,6 +142,7 @@ impl Child {
             Some(File::from(pipe))
         });
         self.process = Some(process);
+        self.afresh = false;
         self.status.clear();
         self.missed = 0;
         self.last_line.clear();

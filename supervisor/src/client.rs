@@ -153,6 +153,21 @@ impl Client {
         self.wait_for(service, patience, |row| row.state == "running" && row.incarnation > before)
     }
 
+    /// Starts every service anew and waits until each is ready, at most `patience` for each.
+    ///
+    /// # Errors
+    /// As [`Client::ask`]; also when one does not become ready.
+    pub fn reload(&mut self, patience: Duration) -> Result<Overview, ClientError> {
+        let before = self.ps()?;
+        self.done(&Request::Reload)?;
+        for old in before.services.iter().filter(|row| row.state != "held") {
+            self.wait_for(&old.name, patience, |row| {
+                row.state == "running" && row.incarnation > old.incarnation
+            })?;
+        }
+        self.ps()
+    }
+
     /// Ends a service until it is released; waits until it has ended, at most `patience`.
     ///
     /// # Errors

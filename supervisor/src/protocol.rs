@@ -18,6 +18,9 @@ pub enum Request {
         #[serde(default)]
         in_flight: bool,
     },
+    /// End every service and start it again as after the system's start, to read plan and configurations anew. Nothing
+    /// that was retained is kept. On the ground only.
+    Reload,
     /// End a service and do not start it until it is released.
     Hold {
         /// Its name.

@@ -243,13 +243,7 @@ impl<S: SharedMemory> Supervisor<S> {
             let name = child.entry.name.clone();
             if let Some(end) = child.reap(now, seconds, |line| show(echo, &name, line)) {
                 let word = child.life.word();
-                for topic in self.shared.recover(&name) {
-                    // What was offered before and not replaced is still on offer: a service that dies while it
-                    // starts finds it again.
-                    if !child.retained.contains(&topic) {
-                        child.retained.push(topic);
-                    }
-                }
+                child.offer_retained(self.shared.recover(&name));
                 news.push(format!("{name}: {end}; {word}"));
             }
         }

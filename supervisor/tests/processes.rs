@@ -130,6 +130,30 @@ fn requests_hold_release_restart_and_show_logs() {
 }
 
 #[test]
+fn a_reload_starts_everything_anew_and_keeps_nothing() {
+    let system =
+        System::started(&[("a", "work", ""), ("b", "work", "criticality = \"flight\""), ("c", "work", "")]);
+    let old = ["a", "b"].map(|name| system.wait_running(name));
+    let mut client = system.client();
+    client.hold("c", false, LONG).unwrap();
+    // What a kill keeps, a reload forgets.
+    kill(old[0], Signal::KILL);
+    let before = system.wait_for("a", |row| row.state == "running" && row.incarnation == Some(1));
+    let overview = client.reload(LONG).unwrap();
+    let state = |name: &str| overview.services.iter().find(|row| row.name == name).unwrap().clone();
+    assert_eq!((state("a").incarnation, state("b").incarnation), (Some(2), Some(1)));
+    assert!(!exists(old[1]) && !exists(before.pid.unwrap()));
+    assert_eq!(state("c").state, "held", "who is held stays so");
+    let log = client.logs("a", 100).unwrap();
+    assert!(log.iter().any(|line| line.ends_with("work: start 1, kept a/state")), "{log:?}");
+    assert!(log.iter().any(|line| line.ends_with("work: start 2, kept")), "{log:?}");
+    // The start after that is offered what was kept of the new one.
+    client.restart("a", false, LONG).unwrap();
+    let log = client.logs("a", 100).unwrap();
+    assert!(log.iter().any(|line| line.ends_with("work: start 3, kept a/state")), "{log:?}");
+}
+
+#[test]
 fn what_keeps_the_aircraft_in_the_air_is_not_restarted_by_mistake() {
     let system = System::started(&[("a", "work", "criticality = \"flight\""), ("b", "work", "")]);
     system.wait_running("a");
@@ -141,7 +165,8 @@ fn what_keeps_the_aircraft_in_the_air_is_not_restarted_by_mistake() {
         let said = refused.unwrap_err().to_string();
         assert!(said.starts_with("a keeps the aircraft in the air: land first, or "), "{said}");
     }
-    assert_eq!(system.row("a").restarts, 0);
+    assert_eq!(client.reload(LONG).unwrap_err().to_string(), "the drone flies: land first");
+    assert_eq!((system.row("a").restarts, system.row("b").restarts), (0, 0));
     assert_eq!(client.restart("b", false, LONG).unwrap().restarts, 1);
     assert_eq!(client.restart("a", true, LONG).unwrap().restarts, 1);
 }

@@ -34,6 +34,8 @@ pub(crate) enum Verb {
     Up(Up),
     /// Show the services of the running system.
     Ps,
+    /// Start every service anew, to read plan and configurations again; on the ground only.
+    Reload,
     /// Restart a service from its executable as it is now.
     Restart {
         service: String,

@@ -29,6 +29,7 @@ fn main() -> ExitCode {
     let done = match &arguments.verb {
         Verb::Up(up) => system::up(place, up, json),
         Verb::Ps => system::ps(place, json),
+        Verb::Reload => system::reload(place, json),
         Verb::Restart { service, in_flight } => system::restart(place, service, *in_flight, json),
         Verb::Hold { service: Some(service), in_flight } => system::hold(place, service, *in_flight, json),
         Verb::Hold { service: None, .. } => operate::give(place, operate::Order::Hold, json),

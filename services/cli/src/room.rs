@@ -43,6 +43,37 @@ fn free_port(wanted: u16) -> Result<u16> {
     Ok(bound.local_addr()?.port())
 }
 
+/// A drone's own copy of the shipped plan: what is changed from the page stays for the next demo and leaves the checkout alone.
+/// When another plan is shipped, it gets a new one.
+fn own_plan(place: &Place, directory: &Path, drone: &str) -> Result<PathBuf> {
+    let (manifest, root) = place.manifest(true)?;
+    let shipped = root.join(&manifest.system.plan);
+    let read = |path: &Path| std::fs::read(path).with_context(|| path.display().to_string());
+    let header = read(&shipped)?;
+    let image = floorplan::PlanHeader::parse(&manifest.system.plan, &header)?.image;
+    let side = shipped.with_extension("rooms.yaml");
+    let mut files = vec![
+        (shipped.clone(), header),
+        (shipped.with_file_name(&image), read(&shipped.with_file_name(&image))?),
+    ];
+    if side.is_file() {
+        files.push((side.clone(), read(&side)?));
+    }
+    let whole: Vec<u8> = files.iter().flat_map(|(_, bytes)| bytes.iter().copied()).collect();
+    let own = directory.join(format!("{drone}-building-{:016x}", runtime::fnv(&whole)));
+    let header = own.join(shipped.file_name().unwrap_or_default());
+    if header.is_file() {
+        return Ok(header);
+    }
+    std::fs::create_dir_all(&own).with_context(|| own.display().to_string())?;
+    // The header last: by it a whole copy is known.
+    for (path, bytes) in files.iter().rev() {
+        let to = own.join(path.file_name().unwrap_or_default());
+        std::fs::write(&to, bytes).with_context(|| to.display().to_string())?;
+    }
+    Ok(header)
+}
+
 /// One drone of the demo: what makes it another than the next.
 #[derive(Debug)]
 pub(crate) struct Berth {
@@ -58,6 +89,7 @@ pub(crate) struct Berth {
 #[derive(Debug)]
 pub(crate) struct Room {
     directory: PathBuf,
+    deploy: PathBuf,
     pub(crate) berths: Vec<Berth>,
     console: Option<Child>,
     said: Option<Receiver<String>>,
@@ -91,8 +123,10 @@ impl Room {
             );
             std::fs::write(&config, text).with_context(|| config.display().to_string())?;
             let overlay = directory.join(format!("{name}.toml"));
+            let plan = own_plan(place, &directory, &name)?;
             let text = format!(
-                "# Written by `sereno demo`.\n[system]\nname = {name:?}\n\n[service.bridge]\nconfig = {:?}\n",
+                "# Written by `sereno demo`.\n[system]\nname = {name:?}\nplan = {:?}\n\n[service.bridge]\nconfig = {:?}\n",
+                plan.display().to_string(),
                 config.display().to_string()
             );
             std::fs::write(&overlay, text).with_context(|| overlay.display().to_string())?;
@@ -109,7 +143,14 @@ impl Room {
             &endpoints,
             now_s,
         )?;
-        Ok(Self { directory, berths, console: None, said: None, again: Instant::now() })
+        Ok(Self {
+            directory,
+            deploy: std::path::absolute(place.deploy()?)?,
+            berths,
+            console: None,
+            said: None,
+            again: Instant::now(),
+        })
     }
 
     /// Starts the console when its program is there (it may still be built); true when it runs.
@@ -140,6 +181,10 @@ impl Room {
         }
         if let Some(toml::Value::Table(zenoh)) = table.get_mut("zenoh") {
             zenoh.insert("client".into(), text(&certs.join("clients/console/console.json5")));
+        }
+        if let Some(toml::Value::Table(rehearsal)) = table.get_mut("rehearsal") {
+            rehearsal.insert("program".into(), text(&program.with_file_name("sereno")));
+            rehearsal.insert("deploy".into(), text(&self.deploy));
         }
         std::fs::write(&config, table.to_string()).with_context(|| config.display().to_string())?;
         let log = self.directory.join("console.log");

@@ -111,6 +111,16 @@ pub(crate) fn restart(place: &Place, service: &str, in_flight: bool, json: bool)
     show(&client(place)?.restart(service, in_flight, PATIENCE)?, json)
 }
 
+pub(crate) fn reload(place: &Place, json: bool) -> Result<ExitCode> {
+    let overview = client(place)?.reload(PATIENCE)?;
+    if json {
+        println!("{}", serde_json::to_string(&overview)?);
+    } else {
+        print_rows(&overview.services);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
 pub(crate) fn hold(place: &Place, service: &str, in_flight: bool, json: bool) -> Result<ExitCode> {
     show(&client(place)?.hold(service, in_flight, PATIENCE)?, json)
 }

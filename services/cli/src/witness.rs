@@ -319,6 +319,14 @@ impl Round {
                 _ => {}
             }
         }
+        for point in 0..u32::BITS {
+            let is = |bits: u32| bits & (1 << point) != 0;
+            if is(patrol.points_barred) {
+                self.skipped.push(format!("point {}: no way to it", point + 1));
+            } else if is(patrol.points_waiting) {
+                self.unfinished.push(format!("point {}: not flown to", point + 1));
+            }
+        }
     }
 
     /// What was not seen of a round that is over.

@@ -2,7 +2,7 @@
 
 use crate::track::SHORTEST_M;
 use floorplan::{DistanceField, Plan, Rooms, Sidecar};
-use patrol::{Costmap, Limits, Progress, Round, Seen};
+use patrol::{Costmap, Limits, Progress, Round, Seen, Wishes};
 use std::sync::Arc;
 
 /// Farther than this from what is not free counts as open, metres.
@@ -16,6 +16,7 @@ pub struct Atlas {
     pad: Option<(f32, f32)>,
     field: DistanceField,
     map: Costmap,
+    wishes: Wishes,
 }
 
 impl Atlas {
@@ -29,6 +30,7 @@ impl Atlas {
             field: DistanceField::of_not_free(open, FIELD_M),
             map: Costmap::new(open, &rooms, &sidecar.doors, &limits),
             pad: sidecar.pad.map(|pad| (pad.x, pad.y)),
+            wishes: wishes(sidecar, &rooms),
             plan,
             rooms,
         }
@@ -58,6 +60,12 @@ impl Atlas {
         self.pad
     }
 
+    /// What is wanted of a round.
+    #[must_use]
+    pub fn wishes(&self) -> &Wishes {
+        &self.wishes
+    }
+
     /// Where a vehicle may fly by the plan alone.
     #[must_use]
     pub fn map(&self) -> &Costmap {
@@ -70,7 +78,7 @@ impl Atlas {
     pub fn left_out(&self) -> Option<Vec<(&str, String)>> {
         let pad = self.pad?;
         let seen = Seen::new(&self.map);
-        let mut round = Round::new(&self.map, self.rooms.len(), pad, pad, &seen);
+        let mut round = Round::new(&self.map, self.rooms.len(), pad, pad, &seen, &self.wishes);
         loop {
             match round.advance(&self.map, &seen, usize::MAX) {
                 Progress::Working => {}
@@ -94,5 +102,18 @@ impl Atlas {
     pub fn plan_hash(&self) -> u32 {
         let hash = self.plan.hash();
         (hash ^ (hash >> 32)) as u32
+    }
+}
+
+/// The side file's round, with rooms by their number.
+fn wishes(sidecar: &Sidecar, rooms: &Rooms) -> Wishes {
+    let numbers = |names: &[String]| -> Vec<usize> {
+        names.iter().filter_map(|name| (0..rooms.len()).find(|room| rooms.name(*room) == name)).collect()
+    };
+    let round = &sidecar.round;
+    Wishes {
+        first: numbers(&round.order),
+        leave_out: numbers(&round.leave_out),
+        points: round.points.iter().map(|point| Some((point.x, point.y))).collect(),
     }
 }

@@ -1,7 +1,7 @@
 //! The route: planned in slices, followed, planned again when something stands in the way.
 
 mod amnesty;
-mod planning;
+pub(crate) mod planning;
 
 use crate::atlas::Atlas;
 use crate::place::Place;
@@ -10,7 +10,7 @@ use crate::track::{MAX_CORNERS, SHORTEST_M, Track};
 use amnesty::{Amnesties, Pardon};
 use core::fmt::{self, Write};
 use ipc_types::{MAX_WAYPOINTS, RoomProgress, Text};
-use patrol::{Bits, Costmap, RoomPlan, Round, RoutePlanner, Seen, Stop, Tally};
+use patrol::{Bits, Costmap, RoomPlan, Round, RoutePlanner, Seen, Stop, Tally, Wishes};
 use std::sync::Arc;
 
 /// One slice of a route, in cells of 0.1 us.
@@ -103,6 +103,10 @@ pub struct Journey {
     pub(crate) setbacks: Setbacks,
     pub(crate) since_trim: u32,
     pub(crate) round: bool,
+    /// What is still wanted of the round: without the points that have been flown to.
+    pub(crate) wishes: Wishes,
+    /// Bit per wished point: there was no way to it.
+    pub(crate) points_barred: u32,
     /// Every place of the round that was to be looked from has been passed or given up.
     pub(crate) looked: bool,
     trouble: Text<64>,
@@ -149,6 +153,8 @@ impl Journey {
             setbacks: Setbacks::new(),
             since_trim: 0,
             round: false,
+            wishes: atlas.wishes().clone(),
+            points_barred: 0,
             looked: false,
             trouble: Text::default(),
             afresh: false,
@@ -184,6 +190,8 @@ impl Journey {
         self.seen_before.clear();
         self.review = false;
         self.kept = None;
+        self.wishes.clone_from(self.atlas.wishes());
+        self.points_barred = 0;
         self.looked = false;
     }
 
@@ -282,6 +290,9 @@ impl Journey {
         }
         let looks = self.stops.iter().filter(|stop| stop.look).count();
         match self.stops.get(self.target) {
+            Some(stop) if stop.point.is_some() => {
+                write!(out, "flying to a point of the round: place {} of {looks}", self.target + 1)
+            }
             Some(stop) if stop.look => {
                 let room = stop.room.map_or("the building", |room| self.atlas.rooms().name(room));
                 write!(out, "looking at {room}: place {} of {looks}", self.target + 1)
@@ -312,6 +323,9 @@ impl Journey {
                 .any(|corner| corner.stop == Some(self.target));
             if !(passed && stop.look) {
                 break;
+            }
+            if let Some(point) = stop.point.and_then(|point| self.wishes.points.get_mut(point)) {
+                *point = None;
             }
             self.target += 1;
             self.since_trim = TRIM_EVERY;

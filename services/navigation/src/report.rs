@@ -1,6 +1,7 @@
 //! The round as the retained message `navigation/patrol`, and back after a restart.
 
 use crate::journey::Journey;
+use crate::journey::planning::bit;
 use crate::mission::Nonsense;
 use ipc_types::{MAX_ROOMS, MAX_WAYPOINTS, Patrol, PatrolState, RoomProgress, RoomState, Waypoint};
 use patrol::Bits;
@@ -23,6 +24,9 @@ impl Journey {
         patrol.seen.copy_from_slice(self.seen.bits().words());
         patrol.unmapped.copy_from_slice(self.map.unmapped().words());
         patrol.coverage = self.coverage();
+        let waiting = self.wishes.points.iter().enumerate().filter(|(_, point)| point.is_some());
+        patrol.points_waiting = waiting.fold(0, |bits, (point, _)| bits | bit(point));
+        patrol.points_barred = self.points_barred;
 
         let used = self.corners.len().min(MAX_WAYPOINTS);
         let next = self.next_corner();
@@ -103,6 +107,11 @@ impl Journey {
         }
         self.new_round();
         self.restore_seen(&patrol.seen);
+        for (k, point) in self.wishes.points.iter_mut().enumerate() {
+            if patrol.points_waiting & bit(k) == 0 {
+                *point = None;
+            }
+        }
         self.map.set_unmapped(&Bits::from_words(&patrol.unmapped));
         for door in 0..self.map.doors().len() {
             let (x, y) = self.map.doors()[door].middle();

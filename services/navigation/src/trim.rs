@@ -27,7 +27,9 @@ impl Journey {
             .iter()
             .take(TRIM_AHEAD)
             .take_while(|stop| {
-                stop.look && self.seen.gain_m2(&self.map, &self.to_see, stop.x, stop.y) < least
+                stop.look
+                    && stop.point.is_none()
+                    && self.seen.gain_m2(&self.map, &self.to_see, stop.x, stop.y) < least
             })
             .count();
         let to = self.target + seen;

@@ -63,5 +63,16 @@ fn world_file(start: &Start) -> Result<WorldFile, StartError> {
     }
     let bytes = start.read(name)?;
     let text = String::from_utf8(bytes).map_err(|_| StartError::invalid(format!("{name} is not text")))?;
-    WorldFile::parse(name, &text).map_err(StartError::invalid)
+    let file = WorldFile::parse(name, &text).map_err(StartError::invalid)?;
+    let hash = format!("{:016x}", start.plan()?.hash());
+    if file.plan_hash.as_ref().is_none_or(|placed| *placed == hash) {
+        return Ok(file);
+    }
+    Ok(WorldFile {
+        name: file.name,
+        ceiling_m: file.ceiling_m,
+        lintel_m: file.lintel_m,
+        file: file.file,
+        ..WorldFile::default()
+    })
 }

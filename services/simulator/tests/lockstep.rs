@@ -68,3 +68,21 @@ fn equal_seeds_give_equal_bytes() {
     assert_eq!(bytes(5), bytes(5));
     assert_ne!(bytes(5), bytes(6));
 }
+
+#[test]
+fn what_is_placed_for_one_plan_stands_on_no_other() {
+    let (manifest, root) = load_manifest(&deploy()).unwrap();
+    let start = |plan: &str| {
+        let system = manifest::System { plan: plan.to_owned(), ..manifest.system.clone() };
+        Start::new(system, &root, 1, 0, true, Cache::default()).unwrap()
+    };
+    let config = Config { clutter: "none".to_owned(), ..Config::default() };
+    let own = start("plans/demo.yaml");
+    let said = format!("the demo's plan has the hash {:016x}", own.plan().unwrap().hash());
+    let desk = |start: &Start| {
+        let world = simulator::build_world(&config, start).unwrap();
+        world.nearest(4.9, 4.9, 0.72, 0.02, 0.05).name == "reception desk"
+    };
+    assert!(desk(&own), "deploy/worlds/demo.toml: plan_hash is another plan's: {said}");
+    assert!(!desk(&start("plans/hall.yaml")));
+}

@@ -62,6 +62,7 @@ impl<S: SharedMemory> Supervisor<S> {
             Request::Restart { service, in_flight } => {
                 self.change(&service, in_flight, now, "restart", |life| life.restart(now))
             }
+            Request::Reload => self.reload(now),
             Request::Hold { service, in_flight } => {
                 self.change(&service, in_flight, now, "hold", |life| life.hold(now))
             }
@@ -74,6 +75,27 @@ impl<S: SharedMemory> Supervisor<S> {
     fn no_such(&self, service: &str) -> Response {
         let names: Vec<&str> = self.children.iter().map(|c| c.entry.name.as_str()).collect();
         Response::Refused { reason: format!("there is no service {service}; there are {}", names.join(", ")) }
+    }
+
+    /// Starts everything anew, unless something flies.
+    fn reload(&mut self, now: Instant) -> Response {
+        if self.phase != Phase::Running {
+            return Response::Refused { reason: format!("the system is {}", self.phase.word()) };
+        }
+        if self.shared.airborne() {
+            return Response::Refused { reason: "the drone flies: land first".to_owned() };
+        }
+        for child in &mut self.children {
+            // What was kept belongs to the plan and the pad that were.
+            child.forget_retained();
+            // Who is held stays so.
+            if let Ok(Some(Action::Terminate)) = child.life.restart(now) {
+                child.signal(Signal::TERM);
+            }
+        }
+        self.say("everything starts anew by request");
+        self.act(now);
+        Response::Done { text: "everything starts anew".to_owned() }
     }
 
     /// Changes the life of a service by order of a human, unless that would drop the aircraft.

@@ -27,6 +27,7 @@ const KNOWN: [&str; 27] = [
     "sim/view",
     "camera/picture",
     "camera/video",
+    "camera/still",
     "camera/wish",
     "signal/in",
     "signal/out",
@@ -256,7 +257,14 @@ fn the_graph_shows_every_topic_and_reader() {
     }
     let edges = graph.lines().filter(|l| l.contains('|')).count();
     let drawn = |topic: &&String| !topic.starts_with("health/") && !topic.starts_with("trace/");
-    let readers: usize = simulated.services.values().map(|s| s.subscribes.keys().filter(drawn).count()).sum();
+    // A topic may have several writers: one edge from each to every reader.
+    let writers = |topic: &String| {
+        let writers = simulated.services.values().filter(|s| s.publishes.contains_key(topic)).count();
+        let tools = graph.lines().any(|l| l.starts_with("    cli ") && l.contains(&format!("|{topic}|")));
+        if topic.starts_with("operator/") { 1 } else { writers + usize::from(tools) }
+    };
+    let readers: usize =
+        simulated.services.values().flat_map(|s| s.subscribes.keys().filter(drawn)).map(writers).sum();
     assert_eq!(edges, readers);
     let table = simulated.table();
     assert!(table.lines().any(|l| l.starts_with("pilot/state") && l.contains("pilot (kept)")), "{table}");

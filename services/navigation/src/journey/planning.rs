@@ -17,6 +17,11 @@ const FRESH_STARTS: u32 = 4;
 /// Marks nearer to the drone than this are forgotten when it is walled in by them, metres.
 const FORGET_M: f32 = 1.0;
 
+/// The bit of a wished point.
+pub(crate) fn bit(point: usize) -> u32 {
+    u32::try_from(point).ok().and_then(|point| 1_u32.checked_shl(point)).unwrap_or(0)
+}
+
 impl Journey {
     /// One bounded slice of planning. Allocates; never part of a decision.
     pub fn work(&mut self, goal: Goal, place: &Place, pad: Option<(f32, f32)>) -> Work {
@@ -69,7 +74,7 @@ impl Journey {
             self.round = false;
             self.stepping_aside = true;
             self.stops.clear();
-            self.stops.push(Stop { x, y, room: None, look: false });
+            self.stops.push(Stop { x, y, room: None, look: false, point: None });
             return self.begin_leg(0, (place.x, place.y));
         }
         self.round = goal == Goal::Round;
@@ -79,14 +84,14 @@ impl Journey {
             (Goal::Home | Goal::Round, None) => return self.no_way("the pad is not known"),
             (Goal::Round, Some(pad)) => {
                 let from = (place.x, place.y);
-                let round = Round::new(&self.map, self.rooms.len(), from, pad, &self.seen);
+                let round = Round::new(&self.map, self.rooms.len(), from, pad, &self.seen, &self.wishes);
                 self.stage = Stage::Round(Box::new(round));
                 return Work::Busy;
             }
             (Goal::Home, Some(pad)) => pad,
         };
         self.stops.clear();
-        self.stops.push(Stop { x: to.0, y: to.1, room: None, look: false });
+        self.stops.push(Stop { x: to.0, y: to.1, room: None, look: false, point: None });
         self.begin_leg(0, (place.x, place.y))
     }
 
@@ -106,6 +111,7 @@ impl Journey {
                     let reason = found.skipped.map(|obstacle| obstacle.reason(name, self.map.doors()));
                     self.reasons[room].set(reason.as_deref().unwrap_or_default());
                 }
+                self.points_barred = round.barred().iter().fold(0, |bits, point| bits | bit(*point));
                 let given_up = &self.given_up;
                 let wanted = |stop: &&Stop| {
                     !stop.look || !given_up.iter().any(|(x, y)| (x - stop.x).hypot(y - stop.y) < SAME_STOP_M)
@@ -169,7 +175,8 @@ impl Journey {
                     self.stage = Stage::Ready;
                     return Work::Idle;
                 }
-                self.stops.remove(stop);
+                let left = self.stops.remove(stop);
+                self.points_barred |= left.point.map_or(0, bit);
                 self.begin_leg(stop, from)
             }
         }

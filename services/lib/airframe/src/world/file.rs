@@ -66,6 +66,9 @@ const LONGEST_NAME: usize = 64;
 pub struct WorldFile {
     /// Name for people.
     pub name: String,
+    /// Hash of the plan for which these things are placed, as `about` says it; on any other plan there are none of them. They
+    /// stand on every plan when left out.
+    pub plan_hash: Option<String>,
     /// Height of the ceiling; 2.6 when left out.
     pub ceiling_m: Option<f32>,
     /// Height of the wall's underside over doors; 2.03 when left out.
