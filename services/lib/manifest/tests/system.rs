@@ -4,7 +4,7 @@
 use manifest::{Criticality, Manifest, ManifestError, Restart, RestartPolicy};
 use std::time::Duration;
 
-const KNOWN: [&str; 27] = [
+const KNOWN: [&str; 28] = [
     "sonar/ranges",
     "flow/motion",
     "sim/ping",
