@@ -3,6 +3,7 @@
 use crate::backoff::Backoff;
 use crate::fleet::Fleet;
 use crate::page::Page;
+use crate::plans::{Drafts, Rehearsals};
 use crate::secret::Digest;
 use crate::store::{Entry, Kind};
 use crate::{Account, Directory, Store};
@@ -46,6 +47,8 @@ pub struct App {
     pub(crate) store: Store,
     pub(crate) fleet: Arc<Fleet>,
     pub(crate) page: Page,
+    pub(crate) drafts: Drafts,
+    pub(crate) rehearsals: Rehearsals,
     pub(crate) clock: Arc<dyn Clock>,
     pub(crate) hashes: Semaphore,
     pub(crate) decoy: String,
@@ -60,6 +63,7 @@ impl App {
         store: Store,
         fleet: Arc<Fleet>,
         page: Page,
+        (drafts, rehearsals): (Drafts, Rehearsals),
         clock: Arc<dyn Clock>,
         directory: Directory,
         decoy: String,
@@ -68,6 +72,8 @@ impl App {
             store,
             fleet,
             page,
+            drafts,
+            rehearsals,
             clock,
             hashes: Semaphore::new(HASHES),
             decoy,

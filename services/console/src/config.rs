@@ -1,6 +1,6 @@
 //! The configuration file. Unknown keys and values out of range are refused by name.
 
-use crate::Lifetime;
+use crate::{Lifetime, RecordingConfig};
 use serde::Deserialize;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -86,6 +86,16 @@ impl SessionConfig {
     }
 }
 
+/// Flights in the simulator before a plan or a round is flown.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RehearsalConfig {
+    /// The program `sereno`; absent: the one beside the console's own program.
+    pub program: Option<PathBuf>,
+    /// The folder of `system.toml`, with vehicles and configurations; absent: where the program finds it.
+    pub deploy: Option<PathBuf>,
+}
+
 /// All of it.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -98,6 +108,12 @@ pub struct ConsoleConfig {
     pub zenoh: ZenohConfig,
     /// Log-ins.
     pub session: SessionConfig,
+    /// Pictures that are kept.
+    #[serde(default)]
+    pub recording: RecordingConfig,
+    /// Rehearsals.
+    #[serde(default)]
+    pub rehearsal: RehearsalConfig,
 }
 
 impl ConsoleConfig {
@@ -117,6 +133,9 @@ impl ConsoleConfig {
         for file in
             [&mut config.data, &mut config.https.certificate, &mut config.https.key, &mut config.zenoh.client]
         {
+            *file = folder.join(&*file);
+        }
+        for file in [&mut config.rehearsal.program, &mut config.rehearsal.deploy].into_iter().flatten() {
             *file = folder.join(&*file);
         }
         Ok(config)
@@ -141,6 +160,9 @@ impl ConsoleConfig {
                 self.https.connections_an_address.to_string(),
                 "4..=https.connections",
             );
+        }
+        if let Some((key, value, allowed)) = self.recording.wrong() {
+            return fail(key, value, allowed);
         }
         if self.zenoh.endpoints.len() > 256 {
             return fail("zenoh.endpoints", format!("{} of them", self.zenoh.endpoints.len()), "up to 256");
@@ -178,6 +200,9 @@ mod tests {
         let config = read(SHIPPED).unwrap();
         assert!(config.https.listen.ip().is_loopback());
         assert!(config.https.redirect.is_none());
+        assert!(config.recording.enabled, "this one is off the board");
+        let bare = SHIPPED.split("[recording]").next().unwrap();
+        assert!(!read(bare).unwrap().recording.enabled, "nothing is kept unless somebody says so");
     }
 
     #[test]
@@ -195,6 +220,20 @@ mod tests {
             ),
             ("# endpoints = [\"tls/", "endpoints = [\"tcp/", "nothing without TLS"),
             ("[session]", "[session]\nidel = 3", "idel"),
+            (
+                "retention_h = 720",
+                "retention_h = 0",
+                "F: recording.retention_h = 0 is out of range: allowed is 1..=8784",
+            ),
+            ("most_gib = 20", "most_gib = 0", "recording.most_gib = 0"),
+            ("free_gib = 2", "free_gib = 0", "recording.free_gib = 0"),
+            (
+                "rolling_s = 30",
+                "rolling_s = 3",
+                "recording.rolling_s = 3 is out of range: allowed is 0, or 5..=120",
+            ),
+            ("enabled = true", "", "enabled"),
+            ("enabled = true", "enabled = true\nkeep = true", "keep"),
             ("127.0.0.1:8443", "here", "invalid socket address"),
         ] {
             let text = SHIPPED.replacen(from, to, 1);

@@ -5,6 +5,8 @@ use crate::config::ConsoleConfig;
 use crate::fleet::Fleet;
 use crate::gate;
 use crate::page::Page;
+use crate::plans::{Drafts, Rehearsals};
+use crate::recording::Recorder;
 use crate::secret::{CLAIM_CHARACTERS, claim_code, claim_digest};
 use crate::server::{self, Places};
 use crate::store::Store;
@@ -46,6 +48,8 @@ pub struct Console {
     /// The claim code to be shown to who installs it; `None` once claimed.
     pub claim: Option<String>,
     certificate: Arc<Certificate>,
+    rehearsals: Rehearsals,
+    recorder: Option<Arc<Recorder>>,
     tasks: Vec<JoinHandle<()>>,
 }
 
@@ -76,9 +80,20 @@ impl Console {
             Directory::new(store.accounts().await?, store.sessions().await?, config.session.lifetime());
         let salt = random::<16>().map_err(|error| StartError::System(error.to_string()))?;
         let decoy = password::decoy(salt).map_err(|error| StartError::System(error.to_string()))?;
-        let fleet =
-            Fleet::open(&config.zenoh, store.clone(), clock.clone(), &store.drones_seen().await?).await?;
-        let app = Arc::new(App::new(store, fleet, page, clock, directory, decoy));
+        let recorder = Recorder::open(config.recording, &config.data, store.clone(), clock.clone())
+            .await
+            .map_err(StartError::System)?;
+        let fleet = Fleet::open(
+            &config.zenoh,
+            store.clone(),
+            clock.clone(),
+            &store.drones_seen().await?,
+            recorder.clone(),
+        )
+        .await?;
+        let rehearsals = Rehearsals::new(&config.rehearsal, &config.data);
+        let plans = (Drafts::new(&config.data), rehearsals.clone());
+        let app = Arc::new(App::new(store, fleet, page, plans, clock, directory, decoy));
         let places = Places::new(config.https.connections, config.https.connections_an_address);
         let mut tasks = vec![
             tokio::spawn(server::serve(listener, tls, places, gate::router(app))),
@@ -88,7 +103,7 @@ impl Console {
             // Places of its own: whoever fills these does not shut the page.
             tasks.push(tokio::spawn(server::redirect(listener, address.port(), Places::new(64, 16))));
         }
-        Ok(Self { address, claim, certificate, tasks })
+        Ok(Self { address, claim, certificate, rehearsals, recorder, tasks })
     }
 
     /// Reads the page's certificate again, now.
@@ -102,8 +117,12 @@ impl Console {
 
 impl Drop for Console {
     fn drop(&mut self) {
+        self.rehearsals.end();
         for task in &self.tasks {
             task.abort();
+        }
+        if let Some(recorder) = &self.recorder {
+            recorder.end();
         }
     }
 }

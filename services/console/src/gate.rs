@@ -5,7 +5,7 @@ use crate::refusal::Refusal;
 use crate::role::is_drone_name;
 use crate::secret::{Digest, digest_of};
 use crate::server::Held;
-use crate::table::{Least, Method, Names, ROUTES, Route};
+use crate::table::{Action, Least, Method, Names, ROUTES, Route};
 use crate::{Account, api, socket};
 use axum::Router;
 use axum::body::{Body, Bytes};
@@ -20,10 +20,9 @@ use std::time::Duration;
 
 /// The cookie's name; the prefix makes browsers insist on Secure, Path=/ and no Domain.
 pub(crate) const COOKIE: &str = "__Host-sereno";
-/// A body is no longer than this.
-const BODY_BYTES: usize = 64 * 1024;
-/// And has come within this time.
+/// A body has come within this time, and a picture within the other.
 const BODY_TIME: Duration = Duration::from_secs(10);
+const PICTURE_TIME: Duration = Duration::from_secs(90);
 /// A message on a WebSocket is no longer than this.
 pub(crate) const MESSAGE_BYTES: usize = 64 * 1024;
 /// What may wait in a WebSocket's own buffer; the largest message from a drone fits.
@@ -147,7 +146,9 @@ async fn pass(
     } else {
         None
     };
-    let body = if upgrade.is_some() { Bytes::new() } else { read(body).await? };
+    // Before the body: whoever may send pictures may not fill the memory with them.
+    let _leave = if row.action == Action::AddDraft { Some(app.drafts.upload()?) } else { None };
+    let body = if upgrade.is_some() { Bytes::new() } else { read(row, body).await? };
     let held = parts.extensions.remove::<Held>();
     let asked = Asked { app, address, who, drone, path, query, headers: parts.headers, body, held };
     match upgrade {
@@ -214,12 +215,14 @@ fn query_of(parts: &Parts) -> HashMap<String, String> {
         .unwrap_or_default()
 }
 
-async fn read(body: Body) -> Result<Bytes, Refusal> {
-    match tokio::time::timeout(BODY_TIME, axum::body::to_bytes(body, BODY_BYTES)).await {
+async fn read(row: &Route, body: Body) -> Result<Bytes, Refusal> {
+    let time = if row.action == Action::AddDraft { PICTURE_TIME } else { BODY_TIME };
+    let most = row.body_bytes();
+    match tokio::time::timeout(time, axum::body::to_bytes(body, most)).await {
         Ok(Ok(bytes)) => Ok(bytes),
         Ok(Err(_)) => Err(Refusal::new(
             StatusCode::PAYLOAD_TOO_LARGE,
-            format!("the request is longer than {BODY_BYTES} bytes, or broke off"),
+            format!("the request is longer than {most} bytes, or broke off"),
         )),
         Err(_) => Err(Refusal::new(StatusCode::REQUEST_TIMEOUT, "the request took too long to come")),
     }

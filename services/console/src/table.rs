@@ -51,8 +51,25 @@ pub enum Action {
     ListDrones,
     About,
     Plan,
+    Still,
+    EditBuilding,
+    ListDrafts,
+    AddDraft,
+    ReadDraft,
+    MakePlan,
+    DraftPicture,
+    DraftPlan,
+    InstallDraft,
+    ListRehearsals,
+    Rehearse,
+    ReadRehearsal,
     MarkIncident,
     ListIncidents,
+    ListRecordings,
+    StartRecording,
+    StopRecording,
+    ReadRecording,
+    EraseRecording,
     ListReports,
     ReadReport,
     Telemetry,
@@ -76,6 +93,18 @@ pub struct Route {
 }
 
 impl Route {
+    /// Bytes of a body at most.
+    #[must_use]
+    pub const fn body_bytes(&self) -> usize {
+        match self.action {
+            // A picture.
+            Action::AddDraft => 16 * 1024 * 1024,
+            // A building with all its corners.
+            Action::EditBuilding | Action::MakePlan | Action::Rehearse => 256 * 1024,
+            _ => 64 * 1024,
+        }
+    }
+
     /// Whether it becomes a WebSocket.
     #[must_use]
     pub fn is_socket(&self) -> bool {
@@ -95,6 +124,7 @@ const fn route(method: Method, path: &'static str, least: Least, names: Names, a
 
 const VIEWER: Least = Least::Account(Role::Viewer);
 const GUARD: Least = Least::Account(Role::Guard);
+const INSTALLER: Least = Least::Account(Role::Installer);
 const ADMINISTRATOR: Least = Least::Account(Role::Administrator);
 
 /// Every route.
@@ -115,8 +145,25 @@ pub const ROUTES: &[Route] = &[
     route(Method::Get,   "/api/drones",                  VIEWER,         Names::NoDrone, Action::ListDrones),
     route(Method::Get,   "/api/drones/{drone}/about",    VIEWER,         Names::InPath,  Action::About),
     route(Method::Get,   "/api/drones/{drone}/plan.png", VIEWER,         Names::InPath,  Action::Plan),
+    route(Method::Get,   "/api/drones/{drone}/still.jpg", VIEWER,        Names::InPath,  Action::Still),
+    route(Method::Post,  "/api/drones/{drone}/building", INSTALLER,      Names::InPath,  Action::EditBuilding),
+    route(Method::Get,   "/api/drones/{drone}/drafts",   INSTALLER,      Names::InPath,  Action::ListDrafts),
+    route(Method::Post,  "/api/drones/{drone}/drafts",   INSTALLER,      Names::InPath,  Action::AddDraft),
+    route(Method::Get,   "/api/drones/{drone}/drafts/{id}", INSTALLER,   Names::InPath,  Action::ReadDraft),
+    route(Method::Post,  "/api/drones/{drone}/drafts/{id}", INSTALLER,   Names::InPath,  Action::MakePlan),
+    route(Method::Get,   "/api/drones/{drone}/drafts/{id}/picture", INSTALLER, Names::InPath, Action::DraftPicture),
+    route(Method::Get,   "/api/drones/{drone}/drafts/{id}/plan.png", INSTALLER, Names::InPath, Action::DraftPlan),
+    route(Method::Post,  "/api/drones/{drone}/drafts/{id}/install", INSTALLER, Names::InPath, Action::InstallDraft),
+    route(Method::Get,   "/api/drones/{drone}/rehearsals", INSTALLER,    Names::InPath,  Action::ListRehearsals),
+    route(Method::Post,  "/api/drones/{drone}/rehearsals", INSTALLER,    Names::InPath,  Action::Rehearse),
+    route(Method::Get,   "/api/drones/{drone}/rehearsals/{id}", INSTALLER, Names::InPath, Action::ReadRehearsal),
     route(Method::Get,   "/api/drones/{drone}/incidents", VIEWER,        Names::InPath,  Action::ListIncidents),
     route(Method::Post,  "/api/drones/{drone}/incidents", GUARD,         Names::InPath,  Action::MarkIncident),
+    route(Method::Get,   "/api/drones/{drone}/recordings", GUARD,        Names::InPath,  Action::ListRecordings),
+    route(Method::Post,  "/api/drones/{drone}/recordings", GUARD,        Names::InPath,  Action::StartRecording),
+    route(Method::Post,  "/api/drones/{drone}/recordings/stop", GUARD,   Names::InPath,  Action::StopRecording),
+    route(Method::Get,   "/api/drones/{drone}/recordings/{id}/film.mp4", GUARD, Names::InPath, Action::ReadRecording),
+    route(Method::Post,  "/api/drones/{drone}/recordings/{id}/erase", ADMINISTRATOR, Names::InPath, Action::EraseRecording),
     route(Method::Get,   "/api/reports",                 VIEWER,         Names::NoDrone, Action::ListReports),
     route(Method::Get,   "/api/reports/{id}",            VIEWER,         Names::NoDrone, Action::ReadReport),
     route(Method::Get,   "/ws/telemetry",                VIEWER,         Names::InQuery, Action::Telemetry),

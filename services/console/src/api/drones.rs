@@ -6,7 +6,7 @@ use crate::page::file;
 use crate::refusal::{Refusal, json, raw_json};
 use crate::store::{Incident, Kind};
 use axum::body::Body;
-use axum::http::{Response, StatusCode};
+use axum::http::{HeaderName, HeaderValue, Response, StatusCode, header};
 use serde::Deserialize;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -30,11 +30,11 @@ pub(super) fn list(asked: &Asked) -> Result<Response<Body>, Refusal> {
     Ok(json(StatusCode::OK, &drones))
 }
 
-fn drone(asked: &Asked) -> Result<Arc<Drone>, Refusal> {
+pub(super) fn drone(asked: &Asked) -> Result<Arc<Drone>, Refusal> {
     asked.app.fleet.drone(&asked.drone).ok_or_else(|| never(&asked.drone))
 }
 
-fn never(drone: &str) -> Refusal {
+pub(super) fn never(drone: &str) -> Refusal {
     Refusal::missing(format!("nothing has been heard of {drone} yet"))
 }
 
@@ -51,6 +51,30 @@ pub(super) async fn plan(asked: Asked) -> Result<Response<Body>, Refusal> {
     Ok(file(Cow::Owned(plan.to_vec()), "image/png", &asked.headers))
 }
 
+/// How old a still is, milliseconds on the drone's clock; absent while that is not known.
+const AGE: HeaderName = HeaderName::from_static("x-sereno-age-ms");
+
+/// The newest still picture of its camera, which makes one a second while it is asked for.
+pub(super) async fn still(asked: Asked) -> Result<Response<Body>, Refusal> {
+    let drone = drone(&asked)?;
+    let absent = |why: &str| Refusal {
+        retry_s: Some(1),
+        ..Refusal::new(StatusCode::SERVICE_UNAVAILABLE, format!("{} {why}", asked.drone))
+    };
+    if !drone.is_alive() {
+        return Err(absent("is not reached"));
+    }
+    let picture = asked.app.fleet.still(&drone).await.ok_or_else(|| absent("sends no picture"))?;
+    let mut response = Response::new(Body::from(picture.jpeg));
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("image/jpeg"));
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    if let Some(age) = drone.age(picture.capture_ns) {
+        headers.insert(AGE, HeaderValue::from(u64::try_from(age.as_millis()).unwrap_or(u64::MAX)));
+    }
+    Ok(response)
+}
+
 /// Bytes in a text about an incident.
 const TEXT_BYTES: usize = 2000;
 
@@ -58,11 +82,18 @@ const TEXT_BYTES: usize = 2000;
 #[serde(deny_unknown_fields)]
 struct Mark {
     text: String,
+    /// Whether the last seconds and what follows are to be kept with it.
+    #[serde(default = "yes")]
+    keep: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// Marks an incident where the drone is now.
 pub(super) async fn mark(asked: Asked) -> Result<Response<Body>, Refusal> {
-    let Mark { text } = asked.json()?;
+    let Mark { text, keep } = asked.json()?;
     let text = text.trim().to_owned();
     if text.len() > TEXT_BYTES {
         return Err(Refusal::bad(format!("text: up to {TEXT_BYTES} bytes")));
@@ -87,7 +118,14 @@ pub(super) async fn mark(asked: Asked) -> Result<Response<Body>, Refusal> {
     entry.answer.clone_from(&incident.text);
     asked.app.store.log(entry).await?;
     asked.app.fleet.incident(&drone, &incident);
-    Ok(json(StatusCode::CREATED, &incident))
+    let mut answer = serde_json::json!(incident);
+    if let (Some(recorder), true, Some(fields)) = (asked.app.fleet.recorder(), keep, answer.as_object_mut()) {
+        // The incident is kept whether its pictures are or not.
+        let kept = recorder.mark(&drone.name, &account.email, incident.id).await;
+        fields.insert("pictures".to_owned(), kept.is_ok().into());
+        fields.insert("trouble".to_owned(), kept.err().unwrap_or_default().into());
+    }
+    Ok(json(StatusCode::CREATED, &answer))
 }
 
 /// The newest incidents.

@@ -3,6 +3,9 @@
 mod accounts;
 mod drones;
 mod login;
+mod plans;
+mod recordings;
+mod rehearsals;
 mod reports;
 
 use crate::gate::Asked;
@@ -31,8 +34,25 @@ pub(crate) async fn act(action: Action, asked: Asked) -> Result<Response<Body>, 
         Action::ListDrones => drones::list(&asked),
         Action::About => drones::about(asked).await,
         Action::Plan => drones::plan(asked).await,
+        Action::Still => drones::still(asked).await,
+        Action::EditBuilding => plans::edit(asked).await,
+        Action::ListDrafts => plans::list(asked).await,
+        Action::AddDraft => plans::add(asked).await,
+        Action::ReadDraft => plans::read(asked).await,
+        Action::MakePlan => plans::make(asked).await,
+        Action::DraftPicture => plans::picture(asked).await,
+        Action::DraftPlan => plans::plan(asked).await,
+        Action::InstallDraft => plans::install(asked).await,
+        Action::ListRehearsals => Ok(rehearsals::list(&asked)),
+        Action::Rehearse => rehearsals::begin(asked).await,
+        Action::ReadRehearsal => rehearsals::read(&asked),
         Action::MarkIncident => drones::mark(asked).await,
         Action::ListIncidents => drones::incidents(asked).await,
+        Action::ListRecordings => recordings::list(asked).await,
+        Action::StartRecording => recordings::start(asked).await,
+        Action::StopRecording => recordings::stop(asked).await,
+        Action::ReadRecording => recordings::film(asked).await,
+        Action::EraseRecording => recordings::erase(asked).await,
         Action::ListReports => reports::list(asked).await,
         Action::ReadReport => reports::read(asked).await,
         Action::Telemetry | Action::Sticks | Action::Signal => Err(Refusal::bad("this is a WebSocket")),

@@ -1,6 +1,9 @@
 //! The drones, as a zenoh client sees them: which are there, what they say, and what is said to them.
 
+mod camera;
 mod drone;
+mod edit;
+mod footage;
 mod hub;
 mod link;
 mod order;
@@ -9,20 +12,22 @@ mod signal;
 pub use drone::Drone;
 pub use link::LinkError;
 
+pub(crate) use edit::PlanPlace;
 pub(crate) use hub::{Box, is_topic};
 pub(crate) use order::{Answer, Asking, Giver};
 pub(crate) use signal::Signal;
 
 use crate::app::Clock;
 use crate::config::ZenohConfig;
+use crate::recording::Recorder;
 use crate::role::{EVERY_DRONE, is_drone_name};
 use crate::round::{Event, Report};
 use crate::store::{Incident, ReportLine};
 use crate::{Account, Store};
 use axum::body::Bytes;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, PoisonError, RwLock, Weak};
+use std::sync::{Arc, Mutex, PoisonError, RwLock, Weak};
 use std::time::Duration;
 use tokio::runtime::Handle;
 use zenoh::qos::{CongestionControl, Priority};
@@ -38,6 +43,10 @@ const QUESTION: Duration = Duration::from_millis(2500);
 const LARGEST_ABOUT: usize = 1024 * 1024;
 const LARGEST_PLAN: usize = 32 * 1024 * 1024;
 
+/// Who looks at the same recording again within this time is not written down again, milliseconds; nor are more remembered.
+const SHOWN_MS: u64 = 600_000;
+const MOST_SHOWN: usize = 256;
+
 /// All drones.
 pub struct Fleet {
     session: zenoh::Session,
@@ -46,6 +55,9 @@ pub struct Fleet {
     store: Store,
     clock: Arc<dyn Clock>,
     runtime: Handle,
+    /// Where this console keeps pictures.
+    recorder: Option<Arc<Recorder>>,
+    shown: Mutex<VecDeque<(String, i64, u64)>>,
 }
 
 impl Fleet {
@@ -53,11 +65,12 @@ impl Fleet {
     ///
     /// # Errors
     /// When the client's file is wrong. A drone that is not there is no error.
-    pub async fn open(
+    pub(crate) async fn open(
         config: &ZenohConfig,
         store: Store,
         clock: Arc<dyn Clock>,
         known: &[String],
+        recorder: Option<Arc<Recorder>>,
     ) -> Result<Arc<Self>, LinkError> {
         let link::Link { session, certificate } = link::open(config).await?;
         let fleet = Arc::new(Self {
@@ -67,6 +80,8 @@ impl Fleet {
             store,
             clock,
             runtime: Handle::current(),
+            recorder: recorder.clone(),
+            shown: Mutex::default(),
         });
         for name in known {
             fleet.meet(name);
@@ -107,7 +122,29 @@ impl Fleet {
                 }
             }
         });
+        if let Some(recorder) = recorder {
+            tokio::spawn(footage::supply(Arc::downgrade(&fleet), recorder));
+        }
         Ok(fleet)
+    }
+
+    /// What keeps pictures; `None` on a console that keeps none.
+    pub(crate) fn recorder(&self) -> Option<&Arc<Recorder>> {
+        self.recorder.as_ref()
+    }
+
+    /// Whether somebody begins to look at a recording: a browser asks for it in many pieces.
+    pub(crate) fn shows_anew(&self, account: &str, recording: i64, now_ms: u64) -> bool {
+        let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
+        shown.retain(|(_, _, at_ms)| now_ms.saturating_sub(*at_ms) < SHOWN_MS);
+        let known = shown.iter().any(|(by, of, _)| by == account && *of == recording);
+        if !known {
+            if shown.len() >= MOST_SHOWN {
+                shown.pop_front();
+            }
+            shown.push_back((account.to_owned(), recording, now_ms));
+        }
+        !known
     }
 
     fn all(&self) -> Vec<Arc<Drone>> {

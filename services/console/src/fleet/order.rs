@@ -6,7 +6,9 @@ use crate::role::Role;
 use crate::secret::hexadecimal;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
+use zenoh::handlers::FifoChannelHandler;
 use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::Reply;
 
 /// After this nobody waits for the drone's answer any more: working out a route takes it ten seconds at most.
 const PATIENCE: Duration = Duration::from_millis(10_500);
@@ -14,6 +16,9 @@ const PATIENCE: Duration = Duration::from_millis(10_500);
 const FIRST_BEACON: Duration = Duration::from_millis(500);
 /// Longest sentence that is taken from a drone, bytes.
 const SENTENCE: usize = 500;
+
+/// What comes back of a query.
+type Replies = FifoChannelHandler<Reply>;
 
 /// What a page asks for.
 #[derive(Clone, Debug, Deserialize)]
@@ -79,11 +84,8 @@ impl Fleet {
         if (verb == "goto") != (place.0.is_some() && place.1.is_some()) {
             return Answer::refused("x_m and y_m belong to goto, both, and to nothing else");
         }
-        let mut beacons = drone.beacon_ns.subscribe();
-        let beacon = tokio::time::timeout(FIRST_BEACON, beacons.wait_for(|beacon_ns| *beacon_ns != 0));
-        let beacon_ns = match beacon.await {
-            Ok(Ok(beacon_ns)) if drone.is_alive() => *beacon_ns,
-            _ => return Answer::refused("the drone is not reached"),
+        let Some(beacon_ns) = drone.fresh_beacon().await else {
+            return Answer::refused("the drone is not reached");
         };
         let Ok(id) = random::<8>() else { return Answer::refused("the system has no random numbers") };
         let payload = Payload {
@@ -115,15 +117,32 @@ impl Fleet {
             Ok(replies) => replies,
             Err(error) => return Answer::refused(format!("the order cannot be sent: {error}")),
         };
-        let reply = tokio::time::timeout(PATIENCE, replies.recv_async()).await;
-        let Ok(Ok(reply)) = reply else { return Answer::refused("the drone has not answered") };
-        let bytes = match reply.result() {
-            Ok(sample) => sample.payload().to_bytes(),
-            Err(error) => error.payload().to_bytes(),
-        };
-        let mut answer = serde_json::from_slice(&bytes)
-            .unwrap_or_else(|_| Answer::refused("the drone's answer is not understood"));
-        crate::text::shorten(&mut answer.text, SENTENCE);
-        answer
+        answer_of(&replies, PATIENCE).await
     }
+}
+
+impl Drone {
+    /// The newest beacon, waited for a moment when the drone has just been found; `None` when it is not reached.
+    pub(super) async fn fresh_beacon(&self) -> Option<u64> {
+        let mut beacons = self.beacon_ns.subscribe();
+        let beacon = tokio::time::timeout(FIRST_BEACON, beacons.wait_for(|beacon_ns| *beacon_ns != 0));
+        match beacon.await {
+            Ok(Ok(beacon_ns)) if self.is_alive() => Some(*beacon_ns),
+            _ => None,
+        }
+    }
+}
+
+/// The answer of the one drone that was asked.
+pub(super) async fn answer_of(replies: &Replies, patience: Duration) -> Answer {
+    let reply = tokio::time::timeout(patience, replies.recv_async()).await;
+    let Ok(Ok(reply)) = reply else { return Answer::refused("the drone has not answered") };
+    let bytes = match reply.result() {
+        Ok(sample) => sample.payload().to_bytes(),
+        Err(error) => error.payload().to_bytes(),
+    };
+    let mut answer = serde_json::from_slice(&bytes)
+        .unwrap_or_else(|_| Answer::refused("the drone's answer is not understood"));
+    crate::text::shorten(&mut answer.text, SENTENCE);
+    answer
 }

@@ -21,6 +21,10 @@ pub enum Kind {
     Order,
     /// An incident was marked.
     Incident,
+    /// A recording was begun, ended, shown, taken away or erased.
+    Recording,
+    /// A building's plan, round or zones were changed, or a flight over them rehearsed.
+    Plan,
 }
 
 impl Kind {
@@ -33,6 +37,8 @@ impl Kind {
             Self::Accounts => "accounts",
             Self::Order => "order",
             Self::Incident => "incident",
+            Self::Recording => "recording",
+            Self::Plan => "plan",
         }
     }
 }

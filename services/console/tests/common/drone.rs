@@ -13,7 +13,16 @@ pub struct Heard {
     pub orders: Vec<(String, Value)>,
     pub sticks: Vec<(String, Value)>,
     pub signals: Vec<(String, String)>,
+    pub edits: Vec<Edit>,
     ids: BTreeSet<String>,
+}
+
+/// An edit of the building as it came.
+#[derive(Clone)]
+pub struct Edit {
+    pub key: String,
+    pub payload: Value,
+    pub picture: Option<Vec<u8>>,
 }
 
 pub struct Drone {
@@ -21,6 +30,9 @@ pub struct Drone {
     pub session: Session,
     pub heard: Arc<Mutex<Heard>>,
     pub png: Vec<u8>,
+    /// What it says of itself, and its plan; to be changed by a test.
+    pub about: Arc<Mutex<Value>>,
+    pub plan: Arc<Mutex<Vec<u8>>>,
     token: Option<LivelinessToken>,
     beacons: tokio::task::JoinHandle<()>,
 }
@@ -71,11 +83,32 @@ impl Drone {
             .await
             .unwrap();
         let about = json!({ "name": name, "simulated": true, "version": "test", "plan": { "hash": "1" } });
+        let about = Arc::new(Mutex::new(about));
+        let (to, clock, own) = (heard.clone(), now.clone(), about.clone());
+        session
+            .declare_queryable(format!("sereno/{name}/edit/*"))
+            .callback(move |query| {
+                let key = query.key_expr().as_str().to_owned();
+                let payload = serde_json::from_slice(&query.payload().unwrap().to_bytes()).unwrap();
+                let picture = query.attachment().map(|bytes| bytes.to_bytes().into_owned());
+                let edit = Edit { key: key.clone(), payload, picture };
+                let answer = edited(&mut to.lock().unwrap(), edit, *clock.lock().unwrap());
+                if let Some(building) = answer.get("building") {
+                    own.lock().unwrap()["building"] = building.clone();
+                }
+                zenoh::Wait::wait(query.reply(key, answer.to_string()).encoding("application/json")).unwrap();
+            })
+            .background()
+            .await
+            .unwrap();
+        let own = about.clone();
         session
             .declare_queryable(format!("sereno/{name}/about"))
             .callback(move |query| {
                 zenoh::Wait::wait(
-                    query.reply(query.key_expr(), about.to_string()).encoding("application/json"),
+                    query
+                        .reply(query.key_expr(), own.lock().unwrap().to_string())
+                        .encoding("application/json"),
                 )
                 .unwrap();
             })
@@ -83,11 +116,15 @@ impl Drone {
             .await
             .unwrap();
         let png = [b"\x89PNG\r\n\x1a\n", name.as_bytes()].concat();
-        let plan = png.clone();
+        let plan = Arc::new(Mutex::new(png.clone()));
+        let own = plan.clone();
         session
             .declare_queryable(format!("sereno/{name}/plan"))
             .callback(move |query| {
-                zenoh::Wait::wait(query.reply(query.key_expr(), plan.clone()).encoding("image/png")).unwrap();
+                zenoh::Wait::wait(
+                    query.reply(query.key_expr(), own.lock().unwrap().clone()).encoding("image/png"),
+                )
+                .unwrap();
             })
             .background()
             .await
@@ -110,7 +147,8 @@ impl Drone {
                 }
             })
         };
-        let mut drone = Self { name: name.to_owned(), session, heard, png, token: None, beacons };
+        let mut drone =
+            Self { name: name.to_owned(), session, heard, png, about, plan, token: None, beacons };
         drone.appear().await;
         drone
     }
@@ -169,4 +207,26 @@ fn answer(heard: &mut Heard, key: &str, order: Value, now_ns: u64) -> Value {
     let verb = key.split('/').nth(3).unwrap_or("").to_owned();
     heard.orders.push((key.to_owned(), order));
     json!({ "accepted": verb != "land", "text": format!("{verb}: heard"), "answers": {} })
+}
+
+/// As docs/off-board.md says: whoever is no installer, comes twice or too late is refused; this one also in the air.
+fn edited(heard: &mut Heard, edit: Edit, now_ns: u64) -> Value {
+    let refused = |text: &str| json!({ "accepted": false, "text": text });
+    let payload = edit.payload.clone();
+    let id = payload["id"].as_str().unwrap_or("").to_owned();
+    let beacon = payload["beacon_ns"].as_u64().unwrap_or(0);
+    heard.edits.push(edit);
+    if id.len() != 16 || !heard.ids.insert(id) {
+        return refused("the same order came before");
+    }
+    if beacon > now_ns || now_ns - beacon > 2_000_000_000 {
+        return refused("the order is too old");
+    }
+    if !matches!(payload["role"].as_str(), Some("installer" | "administrator")) {
+        return refused("this needs the role installer");
+    }
+    if payload["building"]["pad"].is_null() {
+        return refused("not in the air");
+    }
+    json!({ "accepted": true, "text": "written; starting anew with it", "building": payload["building"] })
 }

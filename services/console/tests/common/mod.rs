@@ -3,11 +3,15 @@
 
 pub mod certificates;
 pub mod client;
+pub mod drawing;
 pub mod drone;
+pub mod video;
 
 use certificates::Authority;
 use client::Client;
-use console::{Clock, Console, ConsoleConfig, HttpsConfig, Page, Role, SessionConfig, ZenohConfig};
+use console::{
+    Clock, Console, ConsoleConfig, HttpsConfig, Page, RehearsalConfig, Role, SessionConfig, ZenohConfig,
+};
 use drone::Drone;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -66,6 +70,8 @@ impl Bench {
             },
             zenoh: ZenohConfig { client, endpoints: Vec::new() },
             session: SessionConfig { idle_min: 60, absolute_h: 12 },
+            rehearsal: RehearsalConfig::default(),
+            recording: console::RecordingConfig::default(),
         };
         let clock = Arc::new(TestClock(AtomicU64::new(1_800_000_000_000)));
         let mut bench = Self { folder, authority, config, clock, console: None, endpoints };

@@ -7,6 +7,8 @@ import { claimView, loginView } from "./view/doors.js";
 import { accountsView } from "./view/accounts.js";
 import { dronesView, noDroneView, troubleView } from "./view/drones.js";
 import { logView } from "./view/log.js";
+import { planView } from "./edit/view.js";
+import { recordingsView } from "./view/recordings.js";
 import { reportView, reportsView } from "./view/reports.js";
 import { passwordView } from "./view/password.js";
 import { alarmElsewhere, endWatch, watchView } from "./watch/watch.js";
@@ -19,7 +21,7 @@ let session = null;
 let view = null;
 let alarm = null;
 
-/** Where the address points: #/watch/NAME, #/reports, #/reports/ID, #/accounts, #/log, #/password. */
+/** Where the address points: #/watch/NAME, #/plan/NAME, #/reports, #/reports/ID, #/recordings/NAME, #/accounts, #/log, #/password. */
 function route() {
   const [name = "", argument = ""] = location.hash.replace(/^#\/?/, "").split("/");
   try {
@@ -35,10 +37,12 @@ function choose() {
   const { name, argument } = route();
   const administrator = session.account.role === "administrator";
   if (name === "reports") return { name, view: argument ? reportView(argument, session) : reportsView(session) };
+  if (name === "recordings" && session.account.role !== "viewer") return { name, view: recordingsView(argument, session) };
   if (name === "accounts" && administrator) return { name, view: accountsView(session) };
   if (name === "log" && administrator) return { name, view: logView() };
   if (name === "password") return { name, view: passwordView() };
   if (session.drones.length === 0) return { name: "none", view: noDroneView(session) };
+  if (name === "plan" && session.account.role !== "viewer" && session.drones.includes(argument)) return { name, view: planView(argument, session) };
   if (name === "watch" && session.drones.includes(argument)) return { name: "watch", view: watchView(argument, session) };
   if (session.drones.length === 1) return { name: "watch", view: watchView(session.drones[0], session) };
   return { name: "drones", view: dronesView() };
@@ -80,8 +84,18 @@ async function reload() {
   draw();
 }
 
-addEventListener("hashchange", () => {
-  if (session) draw();
+let staying = false;
+addEventListener("hashchange", (event) => {
+  if (staying || !session) {
+    staying = false;
+    return;
+  }
+  if (view?.leave && !view.leave()) {
+    staying = true;
+    location.replace(new URL(event.oldURL).hash);
+    return;
+  }
+  draw();
 });
 addEventListener("sereno:session", reload);
 

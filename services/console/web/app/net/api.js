@@ -7,14 +7,18 @@ export class ApiError extends Error {
   }
 }
 
-async function request(method, path, body) {
+function request(method, path, body) {
+  return send(method, path, body === undefined ? null : "application/json", body === undefined ? undefined : JSON.stringify(body));
+}
+
+async function send(method, path, type, body) {
   let response;
   try {
     response = await fetch(path, {
       method,
       credentials: "same-origin",
-      headers: body === undefined ? {} : { "content-type": "application/json" },
-      body: body === undefined ? undefined : JSON.stringify(body),
+      headers: type === null ? {} : { "content-type": type },
+      body,
     });
   } catch {
     throw new ApiError(0, "");
@@ -44,9 +48,29 @@ export const changeAccount = (id, form) => request("PATCH", `/api/accounts/${pat
 export const log = (before, limit) => request("GET", `/api/log?limit=${limit}${before ? `&before=${path(before)}` : ""}`);
 export const drones = () => request("GET", "/api/drones");
 export const about = (drone) => request("GET", `/api/drones/${path(drone)}/about`);
-export const planUrl = (drone) => `/api/drones/${path(drone)}/plan.png`;
+/** `hash` tells one plan from the next, so that no old picture of it is shown. */
+export const planUrl = (drone, hash) => `/api/drones/${path(drone)}/plan.png?hash=${path(hash)}`;
+export const stillUrl = (drone) => `/api/drones/${path(drone)}/still.jpg`;
 export const reports = (drone) => request("GET", `/api/reports${drone ? `?drone=${path(drone)}` : ""}`);
 export const report = (id) => request("GET", `/api/reports/${path(id)}`);
+
+export const recordings = (drone) => request("GET", `/api/drones/${path(drone)}/recordings`);
+export const startRecording = (drone) => request("POST", `/api/drones/${path(drone)}/recordings`, {});
+export const stopRecording = (drone) => request("POST", `/api/drones/${path(drone)}/recordings/stop`, {});
+export const eraseRecording = (drone, id) => request("POST", `/api/drones/${path(drone)}/recordings/${path(id)}/erase`, {});
+export const filmUrl = (drone, id) => `/api/drones/${path(drone)}/recordings/${path(id)}/film.mp4`;
+
+// The building, and plans that are made of pictures.
+export const editBuilding = (drone, building) => request("POST", `/api/drones/${path(drone)}/building`, { building });
+export const draft = (drone, id) => request("GET", `/api/drones/${path(drone)}/drafts/${path(id)}`);
+export const makePlan = (drone, id, making) => request("POST", `/api/drones/${path(drone)}/drafts/${path(id)}`, making);
+export const installDraft = (drone, id) => request("POST", `/api/drones/${path(drone)}/drafts/${path(id)}/install`, {});
+export const addDraft = (drone, file) => send("POST", `/api/drones/${path(drone)}/drafts`, file.type || "application/octet-stream", file);
+export const draftPictureUrl = (drone, id) => `/api/drones/${path(drone)}/drafts/${path(id)}/picture`;
+export const draftPlanUrl = (drone, id) => `/api/drones/${path(drone)}/drafts/${path(id)}/plan.png`;
+export const rehearsals = (drone) => request("GET", `/api/drones/${path(drone)}/rehearsals`);
+export const rehearse = (drone, wish) => request("POST", `/api/drones/${path(drone)}/rehearsals`, wish);
+export const rehearsal = (drone, id) => request("GET", `/api/drones/${path(drone)}/rehearsals/${path(id)}`);
 
 /** Address of a WebSocket of the console. */
 export function socketUrl(name, drone) {
@@ -54,5 +78,5 @@ export function socketUrl(name, drone) {
   return `${scheme}://${location.host}/ws/${name}?drone=${path(drone)}`;
 }
 
-export const markIncident = (drone, text) => request("POST", `/api/drones/${path(drone)}/incidents`, { text });
+export const markIncident = (drone, text, keep = true) => request("POST", `/api/drones/${path(drone)}/incidents`, { text, keep });
 export const incidents = (drone) => request("GET", `/api/drones/${path(drone)}/incidents`);

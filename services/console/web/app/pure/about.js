@@ -30,6 +30,7 @@ export function aboutOf(value) {
     name: value?.name ?? "",
     simulated: Boolean(value?.simulated),
     version: value?.version ?? "",
+    hash: String(plan.hash ?? ""),
     resolution_m: numberOr(plan.resolution_m, plan.resolution) ?? 0.05,
     origin_x_m: numberOr(plan.origin_x_m, origin[0], origin.x_m, origin.x) ?? 0,
     origin_y_m: numberOr(plan.origin_y_m, origin[1], origin.y_m, origin.y) ?? 0,

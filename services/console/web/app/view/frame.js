@@ -26,8 +26,18 @@ export function themeButton() {
   return element;
 }
 
+/** The drone that is looked at now, or the first. */
+function droneNow({ drones }) {
+  const named = /^#\/(?:watch|plan)\/([^/]+)/.exec(location.hash)?.[1] ?? "";
+  const found = drones.find((drone) => encodeURIComponent(drone) === named);
+  return encodeURIComponent(found ?? drones[0]);
+}
+
 function links(session) {
-  const list = [["watch", "#/", "eye", t("nav.watch")], ["reports", "#/reports", "report", t("nav.reports")]];
+  const list = [["watch", "#/", "eye", t("nav.watch")]];
+  if (session.account.role !== "viewer" && session.drones.length > 0) list.push(["plan", `#/plan/${droneNow(session)}`, "plan", t("nav.plan")]);
+  list.push(["reports", "#/reports", "report", t("nav.reports")]);
+  if (session.account.role !== "viewer" && session.recording?.keeps) list.push(["recordings", "#/recordings", "record", t("nav.recordings")]);
   if (session.account.role === "administrator") {
     list.push(["accounts", "#/accounts", "users", t("nav.accounts")], ["log", "#/log", "list", t("nav.log")]);
   }

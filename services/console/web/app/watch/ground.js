@@ -1,6 +1,5 @@
 // The plan as paths: floor and walls, traced once from the image.
 
-import { planUrl } from "../net/api.js";
 import { rectangles } from "../pure/walls.js";
 
 /** A pixel darker than this is a wall, lighter than that floor, between the two nothing is known (ROS map_server's grey is 205). */
@@ -10,9 +9,9 @@ const FLOOR = 230;
 const MOST_PIXELS = 4_000_000;
 
 /** {floor, walls: Path2D in pixels, mask: the floor as an image, width, height, box: metres, pixel(x_m, y_m), place(context, projection, ratio)} */
-export async function loadGround(drone, about) {
+export async function loadGround(url, about) {
   const image = new Image();
-  image.src = planUrl(drone);
+  image.src = url;
   await image.decode();
   const shrink = Math.min(1, Math.sqrt(MOST_PIXELS / (image.naturalWidth * image.naturalHeight)));
   const width = Math.max(1, Math.round(image.naturalWidth * shrink));

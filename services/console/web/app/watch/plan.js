@@ -1,5 +1,6 @@
 // The plan: a canvas that is panned, zoomed and clicked, and drawn only when something has changed.
 
+import { planUrl } from "../net/api.js";
 import { Projection } from "../pure/projection.js";
 import { h, iconButton, setData, show } from "../view/dom.js";
 import { t } from "../words/text.js";
@@ -55,11 +56,12 @@ export class PlanPanel {
   }
   async load() {
     const { about } = this.session;
-    if (!about || this.loading) return;
-    this.loading = true;
+    // The same once loaded; another one when the building was edited.
+    if (!about || this.loading === about) return;
+    this.loading = about;
     this.view.radius_m = about.radius_m;
     try {
-      this.view.ground = await loadGround(this.session.drone, about);
+      this.view.ground = await loadGround(planUrl(this.session.drone, about.hash), about);
       show(this.empty, false);
       this.fit();
       try {
@@ -69,7 +71,7 @@ export class PlanPanel {
       }
     } catch {
       this.empty.textContent = t("plan.missing");
-      this.loading = false;
+      this.loading = null;
     }
     this.dirty = true;
   }

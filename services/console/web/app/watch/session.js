@@ -46,12 +46,25 @@ export class WatchSession extends EventTarget {
     this.current = new MeanCurrent();
     this.sonars = new Map();
     this.places = [];
+    /** What was last told of its recording, and when. */
+    this.recording = null;
     this.layers = keptLayers();
     this.telemetry = new Telemetry(drone, {
       heard: (topic, data) => this.heard(topic, data),
       event: (line) => this.chronicle.told(line, Date.now()),
-      link: () => this.tell("link"),
+      link: () => {
+        // One that was away may have come back with another plan.
+        if (this.away && this.telemetry.alive) this.load();
+        this.away = this.telemetry?.alive === false;
+        this.tell("link");
+      },
+      recording: (told) => {
+        this.recording = { told, at: performance.now() };
+        this.tell("recording");
+      },
     });
+    this.again = () => this.load();
+    addEventListener("sereno:building", this.again);
     this.control = this.mayOrder ? new Control(drone, () => this.pilot, account) : null;
     this.want();
     this.ended = false;
@@ -59,7 +72,8 @@ export class WatchSession extends EventTarget {
   }
   async load() {
     try {
-      this.about = aboutOf(await api.about(this.drone));
+      const about = aboutOf(await api.about(this.drone));
+      if (JSON.stringify(about) !== JSON.stringify(this.about)) this.about = about;
       this.aboutError = null;
     } catch (error) {
       this.aboutError = error;
@@ -148,6 +162,7 @@ export class WatchSession extends EventTarget {
   }
   end() {
     this.ended = true;
+    removeEventListener("sereno:building", this.again);
     clearTimeout(this.retry);
     this.control?.end();
     this.telemetry.end();
