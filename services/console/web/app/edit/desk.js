@@ -16,7 +16,9 @@ export class Desk extends EventTarget {
     super();
     this.drone = drone;
     this.account = account;
-    this.may = ["installer", "administrator"].includes(account.role);
+    this.installer = ["installer", "administrator"].includes(account.role);
+    /** Whether the drone says what is in its building: what is not known must not be written over. */
+    this.known = true;
     this.about = null;
     this.error = null;
     /** The draft on the desk: {id, width, height}; null for the building in use. */
@@ -38,6 +40,9 @@ export class Desk extends EventTarget {
   }
   get reading() {
     return this.state.reading;
+  }
+  get may() {
+    return this.installer && this.known;
   }
   get changes() {
     return changes(this.history.base.building, this.building);

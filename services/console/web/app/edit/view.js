@@ -40,8 +40,8 @@ export function planView(drone, { account, drones }) {
   const order = new OrderList(desk);
   const things = new ThingsList(desk, ["points", "no_fly", "privacy", "rooms", "doors"]);
   const drafting = new DraftPanel(desk, canvas);
-  const rehearsal = desk.may ? new RehearsalPanel(desk) : null;
-  const upload = desk.may ? uploadPanel(desk) : null;
+  const rehearsal = desk.installer ? new RehearsalPanel(desk) : null;
+  const upload = desk.installer ? uploadPanel(desk) : null;
 
   const tools = TOOLS.map(([name, iconName]) => button(t(`edit.tool.${name}`), iconName, { class: "tool", onclick: () => {
     desk.setTool(name);
@@ -51,10 +51,8 @@ export function planView(drone, { account, drones }) {
   const undo = iconButton(t("edit.undo"), "undo", { onclick: () => desk.undo() });
   const redo = iconButton(t("edit.redo"), "redo", { onclick: () => desk.redo() });
   const toolbar = h("div", { class: "edit-tools", role: "toolbar", "aria-label": t("edit.tools") }, tools, shapes, h("span", { class: "gap" }), undo, redo);
-  show(toolbar, desk.may);
 
-  const reason = h("p", { class: "note" }, icon("eye"), h("span", {}, t("edit.read_only")));
-  show(reason, !desk.may);
+  const reason = h("p", { class: "note" }, icon("eye"), h("span", {}));
   const absent = h("p", { class: "note bad" }, icon("link-off"), h("span", {}));
   const summary = h("div", { class: "edit-summary", "aria-live": "polite" });
   const answer = h("div", { class: "edit-answer", role: "status" });
@@ -63,7 +61,6 @@ export function planView(drone, { account, drones }) {
   } });
   const use = button(t("edit.use"), "check", { class: "primary", onclick: give });
   const foot = h("div", { class: "edit-foot" }, summary, answer, h("div", { class: "edit-go" }, forget, use));
-  show(foot, desk.may);
   const stage = h("div", { class: "stage" }, canvas.element);
   const column = h("div", { class: "edit-column" }, reason, absent, inspector.element, drafting.element, order.element, things.element, rehearsal?.element ?? null, upload);
   const element = h("div", { class: "edit" }, toolbar, stage, column, foot);
@@ -97,8 +94,13 @@ export function planView(drone, { account, drones }) {
   function update() {
     const { draft, may } = desk;
     setData(element, "draft", Boolean(draft));
+    show(toolbar, may);
+    show(foot, may);
+    show(reason, !may);
+    setText(reason.lastElementChild, t(desk.installer ? "edit.unknown" : "edit.read_only"));
     show(drafting.element, Boolean(draft) && may);
-    if (upload) show(upload, !draft);
+    if (upload) show(upload, !draft && may);
+    if (rehearsal) show(rehearsal.element, may);
     show(order.element, !draft || desk.isMade);
     show(absent, desk.error !== null);
     if (desk.error) setText(absent.lastElementChild, trouble(desk.error));

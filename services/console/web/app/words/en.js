@@ -610,6 +610,7 @@ export default {
   "edit.things": "On the plan",
   "edit.nothing": "Nothing has been drawn on it yet.",
   "edit.read_only": "Only an installer may change the round and the plan. You see what the drone flies by.",
+  "edit.unknown": "This drone does not say what is in its building, so that nothing can be changed here.",
   "edit.leave": "What you changed has not been given to the drone and would be lost. Leave all the same?",
   "edit.forget": "Discard",
   "edit.forget_sure": "Discard everything that was changed?",

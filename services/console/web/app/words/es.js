@@ -610,6 +610,7 @@ export default {
   "edit.things": "En el plano",
   "edit.nothing": "Aún no hay nada dibujado.",
   "edit.read_only": "Solo un instalador puede cambiar la ronda y el plano. Aquí ve con qué vuela el dron.",
+  "edit.unknown": "Este dron no dice qué hay en su edificio, así que aquí no se puede cambiar nada.",
   "edit.leave": "Los cambios no se han enviado al dron y se perderían. ¿Salir de todos modos?",
   "edit.forget": "Descartar",
   "edit.forget_sure": "¿Descartar todos los cambios?",
