@@ -8,6 +8,7 @@ use bytes::Bytes;
 use rtc::interceptor::Slot;
 use rtc::media_stream::MediaStreamTrack;
 use rtc::peer_connection::configuration::media_engine::{MIME_TYPE_H264, MIME_TYPE_RTX};
+use rtc::peer_connection::transport::RTCIceCandidatePair;
 use rtc::rtp::codec::h264::H264Payloader;
 use rtc::rtp::packetizer::Payloader;
 use rtc::rtp::{Header, Packet};
@@ -16,7 +17,6 @@ use rtc::rtp_transceiver::rtp_sender::{
     RTCRtpHeaderExtensionCapability, RTCRtpRtxParameters, RtpCodecKind,
 };
 use std::sync::Arc;
-use std::time::Instant;
 use tokio::sync::{mpsc, watch};
 use webrtc::error::Error;
 use webrtc::media_stream::track_local::static_rtp::TrackLocalStaticRTP;
@@ -24,8 +24,8 @@ use webrtc::media_stream::track_local::{TrackLocal, TrackLocalEvent};
 use webrtc::peer_connection::{
     MediaEngine, PeerConnection, PeerConnectionBuilder, PeerConnectionEventHandler, RTCConfigurationBuilder,
     RTCIceCandidateInit, RTCIceCandidateType, RTCIceServer, RTCIceTransportPolicy, RTCPeerConnectionIceEvent,
-    RTCPeerConnectionState, RTCSessionDescription, RTCStatsReport, RTCStatsReportEntry, Registry,
-    SettingEngineBuilder, StatsSelector, register_default_interceptors,
+    RTCPeerConnectionState, RTCSessionDescription, Registry, SettingEngineBuilder,
+    register_default_interceptors,
 };
 use webrtc::rtp_transceiver::RtpSender;
 
@@ -82,6 +82,8 @@ pub(crate) struct Peer {
     /// Number of the playout delay as negotiated; `None` for a browser that does not know it.
     playout_delay: Option<u8>,
     mode: Mode,
+    /// Relays that the viewer has named; as many as a session may name candidates.
+    relays: Vec<(String, u16)>,
 }
 
 impl Peer {
@@ -168,6 +170,7 @@ impl Peer {
             payload_type: None,
             playout_delay: None,
             mode,
+            relays: Vec::new(),
         })
     }
 
@@ -196,7 +199,8 @@ impl Peer {
     }
 
     /// Takes one more way to reach the viewer.
-    pub(crate) async fn candidate(&self, candidate: Candidate) -> Result<(), Error> {
+    pub(crate) async fn candidate(&mut self, candidate: Candidate) -> Result<(), Error> {
+        self.relays.extend(relay_in(&candidate.candidate));
         let init = RTCIceCandidateInit {
             candidate: candidate.candidate,
             sdp_mid: candidate.sdp_mid,
@@ -244,8 +248,9 @@ impl Peer {
 
     /// `udp`, `tcp` or `turn`; empty while none is chosen.
     pub(crate) async fn path(&self) -> String {
-        let report = self.connection.get_stats(Instant::now(), StatsSelector::None).await;
-        path_in(&report).unwrap_or_default()
+        let Ok(Some(transport)) = self.sender.transport().await else { return String::new() };
+        let pair = transport.ice_transport().get_selected_candidate_pair().await;
+        pair.ok().flatten().map_or_else(String::new, |pair| name_of(&pair, &self.relays))
     }
 
     pub(crate) async fn close(&self) {
@@ -277,24 +282,50 @@ fn codec(mime: &str, fmtp: String, payload_type: u8) -> RTCRtpCodecParameters {
     }
 }
 
-/// The way that most was sent by: its name is `turn` when either end is a relay, and its protocol otherwise.
-fn path_in(report: &RTCStatsReport) -> Option<String> {
-    let pair =
-        report.candidate_pairs().max_by_key(|pair| (pair.nominated, pair.bytes_sent, pair.packets_sent))?;
-    let side = |id: &str| {
-        report.iter().find_map(|entry| match entry {
-            RTCStatsReportEntry::LocalCandidate(candidate)
-            | RTCStatsReportEntry::RemoteCandidate(candidate)
-                if candidate.stats.id.ends_with(id) =>
-            {
-                Some((candidate.candidate_type, candidate.protocol.to_lowercase()))
-            }
-            _ => None,
-        })
-    };
-    let sides = [side(&pair.local_candidate_id), side(&pair.remote_candidate_id)];
-    if sides.iter().flatten().any(|(kind, _)| *kind == RTCIceCandidateType::Relay) {
-        return Some("turn".to_owned());
+/// Where a candidate's line says that a relay listens (RFC 8839, section 5.1); `None` for candidates of other kinds.
+fn relay_in(line: &str) -> Option<(String, u16)> {
+    let words: Vec<&str> = line.split_ascii_whitespace().collect();
+    let (address, port) = (words.get(4)?, words.get(5)?.parse().ok()?);
+    words.windows(2).any(|pair| pair == ["typ", "relay"]).then(|| ((*address).to_owned(), port))
+}
+
+/// The name of a way: `turn` when either end is a relay, and its protocol otherwise. A relay whose packets came before its
+/// candidate is known by its address alone, which is why `relays` are remembered.
+fn name_of(pair: &RTCIceCandidatePair, relays: &[(String, u16)]) -> String {
+    let (local, remote) = (pair.local(), pair.remote());
+    let known = relays.iter().any(|(address, port)| *address == remote.address && *port == remote.port);
+    if known || [local, remote].iter().any(|side| side.typ == RTCIceCandidateType::Relay) {
+        "turn".to_owned()
+    } else {
+        local.protocol.to_string().to_lowercase()
     }
-    sides.into_iter().flatten().map(|(_, protocol)| protocol).find(|protocol| !protocol.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use webrtc::peer_connection::RTCIceCandidate;
+
+    #[test]
+    fn a_relay_is_known_by_its_candidate_and_later_by_its_address() {
+        let line = "candidate:1 1 udp 41885439 192.0.2.7 49152 typ relay raddr 0.0.0.0 rport 0 generation 0";
+        let relay = relay_in(line).unwrap();
+        assert_eq!(relay, ("192.0.2.7".to_owned(), 49152));
+        for other in
+            ["", "candidate:1 1 udp 1 192.0.2.7 49152 typ host", "a b c d e f typ relay", "typ relay"]
+        {
+            assert_eq!(relay_in(other), None, "{other}");
+        }
+        let side = |typ, port| RTCIceCandidate {
+            address: "192.0.2.7".to_owned(),
+            port,
+            typ,
+            ..RTCIceCandidate::default()
+        };
+        let host = || side(RTCIceCandidateType::Host, 1);
+        let name = |remote| name_of(&RTCIceCandidatePair::new(host(), remote), std::slice::from_ref(&relay));
+        assert_eq!(name(side(RTCIceCandidateType::Prflx, 49152)), "turn");
+        assert_eq!(name(side(RTCIceCandidateType::Relay, 9)), "turn");
+        assert_ne!(name(side(RTCIceCandidateType::Prflx, 9)), "turn");
+    }
 }

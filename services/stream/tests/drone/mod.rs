@@ -49,6 +49,7 @@ criticality = "comfort"
 tick_hz = 120
 heartbeat_ms = 2000
 publishes.'camera/video' = { hz = 15 }
+publishes.'camera/still' = { hz = 0 }
 publishes.'sim/shutter' = { hz = 15 }
 subscribes.'camera/wish' = { depth = 8, wake = true }
 subscribes.'camera/picture' = { depth = 1, wake = true }
