@@ -85,9 +85,23 @@ impl Client {
     }
 
     pub(crate) fn ask(&self, key: &str, payload: Option<Vec<u8>>, patience: Duration) -> Option<Vec<u8>> {
+        self.ask_with(key, payload, None, patience)
+    }
+
+    /// Asks with something attached.
+    pub(crate) fn ask_with(
+        &self,
+        key: &str,
+        payload: Option<Vec<u8>>,
+        attachment: Option<Vec<u8>>,
+        patience: Duration,
+    ) -> Option<Vec<u8>> {
         let mut question = self.session.get(key).with(FifoChannel::new(4)).timeout(patience);
         if let Some(payload) = payload {
             question = question.payload(payload);
+        }
+        if let Some(attachment) = attachment {
+            question = question.attachment(attachment);
         }
         let replies = question.wait().ok()?;
         while let Ok(reply) = replies.recv() {

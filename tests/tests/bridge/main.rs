@@ -1,6 +1,7 @@
 //! The bridge over real TLS, as a process of a flying system: who may what, what nobody may, and how quick it is.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "tests")]
 
+mod building;
 mod client;
 mod system;
 
@@ -119,6 +120,24 @@ fn roles_hold(system: &System) {
     assert_eq!(board.heard(), Vec::<String>::new());
     accepted(&mut guard, Verb::AutomaticOn);
     assert!(!board.heard().is_empty(), "and this is how it looks when something comes");
+    wishes_wake_the_camera(&viewer);
+}
+
+/// Whoever sees may wish for pictures, under the own name only, and for two seconds at a time.
+fn wishes_wake_the_camera(viewer: &Client) {
+    let wish = r#"{"video":{"width":320,"height":240,"fps":15},"still":false}"#;
+    let video = viewer.keys.telemetry("camera/video");
+    assert!(!viewer.hears(&video, SILENCE), "nobody wants any");
+    for nonsense in ["", "{}", r#"{"video":{"width":321,"height":240,"fps":15}}"#, &"x".repeat(2000)] {
+        viewer.put(&viewer.keys.wish("viewer"), nonsense);
+    }
+    viewer.put(&viewer.keys.wish("guard"), wish);
+    assert!(!viewer.hears(&video, SILENCE), "junk, and a wish under another's name");
+    wait_until("pictures that are wished for", || {
+        viewer.put(&viewer.keys.wish("viewer"), wish);
+        viewer.hears(&video, SILENCE)
+    });
+    wait_until("no pictures when nobody wishes any more", || !viewer.hears(&video, SILENCE));
 }
 
 #[test]
@@ -133,6 +152,17 @@ fn guards_order_viewers_see_and_nobody_speaks_for_another() {
     sticks_need_the_lease_and_are_quick(&system);
     a_flood_loses_no_frame(&system);
     lists_and_papers_are_read_again(&system);
+}
+
+#[test]
+fn an_installer_changes_the_building_and_nobody_else() {
+    let endpoint = free_endpoint();
+    let system = System::start(Way::Direct, &endpoint);
+    system.wait_bridge(&endpoint);
+    building::who_may_not_changes_nothing(&system);
+    building::a_round_is_taken_over(&system);
+    building::a_plan_is_taken_over(&system);
+    building::not_in_the_air(&system);
 }
 
 #[test]

@@ -56,7 +56,7 @@ pub(crate) fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
 
 impl System {
     /// Starts a system whose bridge is on the network, or on its way to a router at `endpoint`. Clients: a `guard`, a
-    /// `viewer`, another guard (`other`), and one whose certificate is on no list (`revoked`).
+    /// `viewer`, an `installer`, another guard (`other`), and one whose certificate is on no list (`revoked`).
     pub(crate) fn start(way: Way, endpoint: &str) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let directory = tempfile::tempdir().unwrap();
@@ -67,6 +67,7 @@ impl System {
         for (name, role) in [
             ("guard", Role::Guard),
             ("viewer", Role::Viewer),
+            ("installer", Role::Installer),
             ("other", Role::Guard),
             ("revoked", Role::Guard),
         ] {
@@ -95,7 +96,7 @@ impl System {
         &self.deploy
     }
 
-    fn run_dir(&self) -> PathBuf {
+    pub(crate) fn run_dir(&self) -> PathBuf {
         self.directory.path().join("run")
     }
 
