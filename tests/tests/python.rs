@@ -62,9 +62,8 @@ fn the_examples_follow_the_pose_save_a_picture_and_start_a_round() {
     let file = std::fs::read(directory.path().join("seen.jpg")).unwrap();
     let picture = image::load_from_memory_with_format(&file, image::ImageFormat::Jpeg).unwrap().to_luma8();
     assert_eq!(picture.dimensions(), (640, 480));
-    let (least, most) = picture.pixels().fold((255, 0), |(least, most), pixel| {
-        (pixel.0[0].min(least), pixel.0[0].max(most))
-    });
+    let (least, most) =
+        picture.pixels().fold((255, 0), |(least, most), pixel| (pixel.0[0].min(least), pixel.0[0].max(most)));
     assert!(most - least > 60, "a room, not a grey wall: {least} to {most}");
 
     let refused = run("start_round.py", "viewer", "1");

@@ -12,7 +12,7 @@ const SLOWEST: &str = "-timeout=20";
 const SLOWEST_REPORT: &str = "-report_slow_units=20";
 
 /// The targets that need every service, and the feature that brings them.
-const SERVICES: ([&str; 2], &str) = (["config", "network"], "services");
+const SERVICES: ([&str; 3], &str) = (["config", "network", "signal"], "services");
 
 /// Builds the targets and runs each for so long; all of them when none is named.
 ///

@@ -5,7 +5,7 @@ mod common;
 
 use common::{Bench, until};
 use console::Role;
-use ipc_types::{Message, Still};
+use ipc_types::{Field, Still};
 use serde_json::{Value, json};
 use std::mem::offset_of;
 use std::sync::{Arc, Mutex};
@@ -61,10 +61,8 @@ async fn stills_are_wished_for_while_somebody_asks_and_served_with_their_age() {
         reply = viewer.get("/api/drones/north/still.jpg").await;
     }
     assert_eq!((reply.status, &reply.bytes[..]), (200, &JPEG[..]));
-    assert_eq!(
-        (&reply.headers["content-type"], &reply.headers["cache-control"]),
-        (&"image/jpeg", &"no-store")
-    );
+    assert_eq!(reply.headers["content-type"], "image/jpeg");
+    assert_eq!(reply.headers["cache-control"], "no-store");
     // The rig's clock began at one second.
     let age: u64 = reply.headers["x-sereno-age-ms"].to_str().unwrap().parse().unwrap();
     assert!((50..600_000).contains(&age), "{age}");

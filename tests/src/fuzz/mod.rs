@@ -24,6 +24,8 @@ mod msp;
 #[cfg(feature = "services")]
 mod network;
 mod plan;
+#[cfg(feature = "services")]
+mod signal;
 mod vehicle;
 mod world;
 
@@ -35,6 +37,8 @@ pub use msp::msp_stream;
 #[cfg(feature = "services")]
 pub use network::network;
 pub use plan::{plan, sidecar};
+#[cfg(feature = "services")]
+pub use signal::signal;
 pub use vehicle::vehicle;
 pub use world::world;
 
@@ -57,6 +61,8 @@ pub const TARGETS: &[Target] = &[
     ("config", config),
     #[cfg(feature = "services")]
     ("network", network),
+    #[cfg(feature = "services")]
+    ("signal", signal),
 ];
 
 /// Services with a configuration, by selector: the target `config` takes `0` and the characters after it.

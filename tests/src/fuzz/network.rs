@@ -25,7 +25,8 @@ pub fn network(data: &[u8]) -> bool {
     }
 }
 
-fn said(error: &str) -> bool {
+/// A refusal is one plain line that is not long. Returns false: the input was not accepted.
+pub(super) fn said(error: &str) -> bool {
     assert!(!error.is_empty() && !error.chars().any(char::is_control), "not one plain line: {error:?}");
     assert!(error.len() < 1000, "{} bytes of answer", error.len());
     false

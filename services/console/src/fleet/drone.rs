@@ -1,5 +1,7 @@
 //! One drone as the console knows it.
 
+use super::camera::Camera;
+use super::footage::Footage;
 use super::hub::{Box, Hub};
 use crate::round::{Event, Follower, News, Place};
 use axum::body::Bytes;
@@ -7,6 +9,7 @@ use axum::extract::ws::{Message, Utf8Bytes};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::time::Duration;
 
 /// Lines that a page gets when it comes.
 const REMEMBERED: usize = 100;
@@ -28,6 +31,8 @@ pub struct Drone {
     pub(super) alive: AtomicBool,
     /// The newest beacon; 0 before any.
     pub(super) beacon_ns: tokio::sync::watch::Sender<u64>,
+    pub(super) camera: Camera,
+    pub(super) footage: Footage,
     hub: Mutex<Hub>,
     memory: Mutex<Memory>,
     /// Sockets of sticks, which get each beacon at once, with their numbers.
@@ -47,6 +52,8 @@ impl Drone {
             name: Arc::from(name),
             alive: AtomicBool::new(false),
             beacon_ns: tokio::sync::watch::Sender::new(0),
+            camera: Camera::default(),
+            footage: Footage::default(),
             hub: Mutex::new(Hub::default()),
             memory: Mutex::new(Memory {
                 follower: Follower::new(name),
@@ -79,6 +86,12 @@ impl Drone {
         self.memory().follower.place()
     }
 
+    /// How old something is that was there at `then_ns` of the drone's clock; `None` while its clock is not known.
+    pub(crate) fn age(&self, then_ns: u64) -> Option<Duration> {
+        let now_ns = *self.beacon_ns.borrow();
+        (now_ns > 0).then(|| Duration::from_nanos(now_ns.saturating_sub(then_ns)))
+    }
+
     /// Who holds its sticks.
     #[must_use]
     pub fn holder(&self) -> String {
@@ -97,6 +110,9 @@ impl Drone {
     /// A page begins to look: whether the drone is there, and what happened of late.
     pub(crate) fn watch(&self, page: &Box) {
         page.line(self.alive_line());
+        if let Some(line) = self.footage.line() {
+            page.line(line);
+        }
         for event in &self.memory().events {
             page.line(event.clone());
         }
