@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use shiguredo_mp4::demux::{Fmp4FileDemuxer, Input};
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -38,6 +38,17 @@ async fn list(client: &Client) -> Value {
 
 async fn recordings(client: &Client) -> Vec<Value> {
     list(client).await["recordings"].as_array().unwrap().clone()
+}
+
+/// A console that dies without a word, whatever becomes of the test.
+struct Killed(Child);
+
+impl Drop for Killed {
+    fn drop(&mut self) {
+        // SIGKILL.
+        self.0.kill().unwrap();
+        self.0.wait().unwrap();
+    }
 }
 
 /// Films until the list satisfies `done`.
@@ -70,9 +81,13 @@ fn read(bytes: &[u8]) -> (usize, usize, u64) {
         return (0, 0, 0);
     }
     let mut demuxer = Fmp4FileDemuxer::new();
-    demuxer.handle_input(Input { position: 0, data: bytes });
     let (mut frames, mut keys, mut ticks) = (0, 0, 0);
-    while let Some(sample) = demuxer.next_sample().unwrap() {
+    loop {
+        while let Some(wanted) = demuxer.required_input() {
+            let from = bytes.len().min(wanted.position as usize);
+            demuxer.handle_input(Input { position: wanted.position, data: &bytes[from..] });
+        }
+        let Some(sample) = demuxer.next_sample().unwrap() else { break };
         let nal = &bytes[sample.data_offset as usize..][..sample.data_size];
         assert_eq!(
             u32::from_be_bytes(nal[..4].try_into().unwrap()) as usize + 4,
@@ -332,8 +347,9 @@ async fn a_recording_survives_a_console_that_is_killed() {
         .arg(&file)
         .stdout(Stdio::piped())
         .spawn()
+        .map(Killed)
         .unwrap();
-    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut lines = BufReader::new(child.0.stdout.take().unwrap()).lines();
     let address = lines.next().unwrap().unwrap();
     let address = address.strip_prefix("the watch room: https://").unwrap().trim_end_matches('/').to_owned();
     let claim = lines.next().unwrap().unwrap();
@@ -353,8 +369,7 @@ async fn a_recording_survives_a_console_that_is_killed() {
         read(&eva.get(&path_of(&open)).await.bytes).0 >= 75
     })
     .await;
-    child.kill().unwrap();
-    child.wait().unwrap();
+    drop(child);
 
     bench.config.recording = KEEPS;
     // The clock of the killed one was the system's.

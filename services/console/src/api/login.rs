@@ -21,7 +21,11 @@ const WRONG: &str = "e-mail address or password are wrong";
 
 /// The state of the session, also for those who have none.
 pub(super) fn session(asked: &Asked) -> Response<Body> {
-    json(StatusCode::OK, &state(&asked.app, asked.who.as_ref().map(|(account, _)| account)))
+    let mut state = state(&asked.app, asked.who.as_ref().map(|(account, _)| account));
+    if let (Some(fields), Some(_)) = (state.as_object_mut(), &asked.who) {
+        fields.insert("recording".to_owned(), super::recordings::standing(asked));
+    }
+    json(StatusCode::OK, &state)
 }
 
 fn state(app: &App, account: Option<&Account>) -> serde_json::Value {

@@ -1,5 +1,6 @@
 //! WebRTC's messages between a page and a drone.
 
+use super::footage::Viewer;
 use super::{Box, Drone, Fleet};
 use axum::extract::ws::{Message, Utf8Bytes};
 use std::sync::Arc;
@@ -12,6 +13,7 @@ pub(crate) struct Signal {
     key: String,
     /// Undeclared with it.
     _out: Subscriber<()>,
+    _viewer: Viewer,
 }
 
 impl Fleet {
@@ -38,7 +40,7 @@ impl Fleet {
             })
             .await
             .map_err(|error| error.to_string())?;
-        Ok(Signal { key: format!("{key}/in"), _out: out })
+        Ok(Signal { key: format!("{key}/in"), _out: out, _viewer: Viewer::of(drone) })
     }
 
     /// Says something to the drone in a session. None is lost while the link lives; a thread of its own waits for room.

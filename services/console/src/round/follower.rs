@@ -78,6 +78,12 @@ impl Follower {
         self.place
     }
 
+    /// Whether the drone is off the ground, as far as it has said.
+    #[must_use]
+    pub fn flies(&self) -> bool {
+        self.phase.is_some_and(|phase| !matches!(phase, Phase::Grounded | Phase::Arming))
+    }
+
     /// Who holds the sticks; empty for nobody.
     #[must_use]
     pub fn holder(&self) -> &str {
@@ -190,7 +196,7 @@ impl Follower {
     }
 
     fn begin(&mut self, now_ms: u64) {
-        let airborne = self.phase.is_some_and(|phase| !matches!(phase, Phase::Grounded | Phase::Arming));
+        let airborne = self.flies();
         let mut report = Report {
             drone: self.drone.clone(),
             started_ms: now_ms,

@@ -2,11 +2,13 @@
 
 mod accounts;
 mod log;
+mod recordings;
 mod reports;
 mod schema;
 
 pub use accounts::NewAccount;
 pub use log::{Entry, Kind};
+pub use recordings::Recording;
 pub use reports::{Incident, ReportLine};
 
 use rusqlite::Connection;

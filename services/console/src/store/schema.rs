@@ -5,7 +5,8 @@ use rusqlite::Connection;
 use std::path::Path;
 
 /// One step a version; a step that has been released is never changed.
-const STEPS: &[&str] = &["
+const STEPS: &[&str] = &[
+    "
 CREATE TABLE starts (id INTEGER PRIMARY KEY, time_ms INTEGER NOT NULL) STRICT;
 
 CREATE TABLE accounts (
@@ -77,7 +78,25 @@ CREATE TABLE reports (
     report TEXT NOT NULL
 ) STRICT;
 CREATE INDEX reports_by_drone ON reports (drone, landed_ms);
-"];
+",
+    "
+CREATE TABLE recordings (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    drone TEXT NOT NULL,
+    started_ms INTEGER NOT NULL,
+    ended_ms INTEGER,
+    bytes INTEGER NOT NULL,
+    width INTEGER NOT NULL,
+    height INTEGER NOT NULL,
+    account TEXT NOT NULL,
+    incident INTEGER REFERENCES incidents (id),
+    follows INTEGER REFERENCES recordings (id),
+    erased_ms INTEGER,
+    erased_by TEXT
+) STRICT;
+CREATE INDEX recordings_by_drone ON recordings (drone, started_ms);
+",
+];
 
 /// Brings the file to this version: all or nothing.
 pub(super) fn migrate(connection: &mut Connection, path: &Path) -> Result<(), StoreError> {

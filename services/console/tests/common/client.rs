@@ -70,6 +70,16 @@ impl Client {
     }
 
     pub async fn send(&self, method: &str, path: &str, body: impl Into<Body>) -> Reply {
+        self.send_with(method, path, &[], body).await
+    }
+
+    pub async fn send_with(
+        &self,
+        method: &str,
+        path: &str,
+        headers: &[(&str, &str)],
+        body: impl Into<Body>,
+    ) -> Reply {
         let io = TokioIo::new(self.connect().await);
         let (mut sender, connection) = hyper::client::conn::http1::handshake(io).await.unwrap();
         tokio::spawn(connection);
@@ -83,6 +93,9 @@ impl Client {
         }
         if let Some(origin) = &self.origin {
             request = request.header("origin", origin);
+        }
+        for (name, value) in headers {
+            request = request.header(*name, *value);
         }
         let request = request.body(body.into()).unwrap();
         let response = tokio::time::timeout(DEADLINE, sender.send_request(request)).await.unwrap().unwrap();
@@ -98,6 +111,10 @@ impl Client {
 
     pub async fn get(&self, path: &str) -> Reply {
         self.send("GET", path, Body::empty()).await
+    }
+
+    pub async fn get_with(&self, path: &str, headers: &[(&str, &str)]) -> Reply {
+        self.send_with("GET", path, headers, Body::empty()).await
     }
 
     pub async fn post(&self, path: &str, body: &Value) -> Reply {

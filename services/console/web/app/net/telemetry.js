@@ -60,6 +60,7 @@ export class Telemetry {
       this.handlers.link();
     } else if (message.answer) this.orders.answered(message.answer);
     else if (message.event) this.handlers.event(message.event);
+    else if (message.recording) this.handlers.recording?.(message.recording);
     else if (typeof message.error === "string") this.handlers.event({ kind: "link", text: message.error });
   }
   binary(buffer) {

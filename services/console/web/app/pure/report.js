@@ -46,7 +46,7 @@ export function reportOf(value) {
     coverage: Number(report.coverage) || 0,
     text: report.text ?? "",
     rooms: list(report.rooms, "rooms").map(roomOf),
-    incidents: list(report.incidents, "incidents").map((one) => ({ time_ms: one.time_ms, text: one.text ?? "", account: one.account ?? "", x_m: one.x_m ?? null, y_m: one.y_m ?? null })),
+    incidents: list(report.incidents, "incidents").map((one) => ({ id: one.id ?? null, time_ms: one.time_ms, text: one.text ?? "", account: one.account ?? "", x_m: one.x_m ?? null, y_m: one.y_m ?? null })),
     failsafes: list(report.failsafes).map(spanOf),
     flown_by: list(report.flown_by).map(spanOf),
     silences: list(report.silences).map(spanOf),

@@ -9,7 +9,7 @@ import { sentence } from "../words/sentences.js";
 import { moment, t } from "../words/text.js";
 
 const PAGE = 100;
-const TONE = { claimed: "lamp", "log-in": "ok", "log-out": "", failed: "alarm", accounts: "info", order: "lamp", incident: "caution" };
+const TONE = { claimed: "lamp", "log-in": "ok", "log-out": "", failed: "alarm", accounts: "info", order: "lamp", incident: "caution", recording: "info" };
 
 function row(line) {
   const kind = line.kind in TONE ? t(`log.kind.${line.kind}`) : line.kind;

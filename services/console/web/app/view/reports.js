@@ -3,9 +3,11 @@
 import * as api from "../net/api.js";
 import { h, button, fill, icon } from "./dom.js";
 import { empty } from "./drones.js";
+import { play } from "./recordings.js";
 import { trouble } from "./form.js";
 import { clock } from "../pure/age.js";
 import { list } from "../pure/lists.js";
+import { clipsOf, recordingsOf } from "../pure/recording.js";
 import { outcomeOf, reportOf } from "../pure/report.js";
 import { sentence } from "../words/sentences.js";
 import { capital, moment, number, t, timeOfDay } from "../words/text.js";
@@ -90,7 +92,7 @@ function paper(report) {
       : h("p", { class: "quiet" }, t("report.no_rooms")),
     h("h2", {}, t("report.incidents")),
     report.incidents.length > 0
-      ? h("ol", { class: "incidents" }, report.incidents.map((incident) => h("li", {}, h("time", {}, timeOfDay(incident.time_ms)), h("div", {}, h("strong", {}, incident.text || t("report.incident")),
+      ? h("ol", { class: "incidents" }, report.incidents.map((incident) => h("li", { data: { incident: incident.id ?? "" } }, h("time", {}, timeOfDay(incident.time_ms)), h("div", {}, h("strong", {}, incident.text || t("report.incident")),
           h("span", { class: "quiet" }, [incident.account, incident.x_m === null ? "" : t("report.at", { x: number(incident.x_m, 1), y: number(incident.y_m, 1) })].filter(Boolean).join(" · "))))))
       : h("p", { class: "quiet" }, t("report.no_incidents")),
     spans(t("report.failsafes"), report.failsafes),
@@ -99,10 +101,25 @@ function paper(report) {
   ];
 }
 
-export function reportView(id) {
+/** Puts the pictures that were kept beside each incident, for who may see them. */
+async function addClips(body, report) {
+  const recordings = recordingsOf(await api.recordings(report.drone));
+  for (const incident of report.incidents) {
+    const clips = clipsOf(incident.id, recordings);
+    body.querySelector(`[data-incident="${Number(incident.id)}"]`)?.append(h("span", { class: "row-actions no-print" }, clips.map((one) =>
+      button(t("report.clip"), "play", { "aria-label": `${t("report.clip")}: ${timeOfDay(incident.time_ms)}`, onclick: () => play(report.drone, one) }))));
+  }
+}
+
+export function reportView(id, session) {
   const body = h("article", { class: "card paper", "aria-live": "polite" });
   api.report(id).then(
-    (value) => fill(body, paper(reportOf(value))),
+    (value) => {
+      const report = reportOf(value);
+      fill(body, paper(report));
+      // Without them the report is what it is.
+      if (session.account.role !== "viewer" && session.recording?.keeps && report.incidents.length > 0) addClips(body, report).catch(() => {});
+    },
     (error) => fill(body, h("p", { class: "note bad" }, icon("alert"), h("span", {}, trouble(error)))),
   );
   return {

@@ -20,6 +20,7 @@ export class DockPanel {
   constructor(session, plan, actions) {
     this.session = session;
     this.plan = plan;
+    this.keeps = actions.keeps;
     this.pending = new Map();
     this.primaryIcon = icon("play");
     this.primaryWords = h("span", { class: "label" });
@@ -99,6 +100,14 @@ export class DockPanel {
     element.addEventListener("contextmenu", (event) => event.preventDefault());
     return element;
   }
+  /** Says something that is no answer to an order. */
+  note(words) {
+    const row = h("p", { class: "feedback-row", data: { outcome: "refused" } }, icon("alert"), h("span", {}, words),
+      h("button", { type: "button", class: "icon-button", "aria-label": t("app.close"), onclick: () => row.remove() }, icon("cross")));
+    this.feedback.append(row);
+    while (this.feedback.children.length > 3) this.feedback.firstElementChild.remove();
+    setTimeout(() => row.remove(), REFUSED_MS);
+  }
   /** Gives an order and shows it pending, then what came of it. */
   async give(verb, control, more = {}) {
     this.setSheet(false);
@@ -142,12 +151,15 @@ export class DockPanel {
   }
   askIncident() {
     this.setSheet(false);
+    const seconds = this.keeps?.keeps ? this.keeps.rolling_s ?? 0 : 0;
     openDialog(t("incident.mark"), (close) => form([
       h("p", { class: "quiet" }, t("incident.words")),
       h("label", { class: "field" }, h("span", {}, t("incident.what")), h("textarea", { class: "input", name: "text", rows: 3, maxlength: 1000, autofocus: true })),
-    ], t("incident.keep"), async ({ text }) => {
-      await api.markIncident(this.session.drone, text.trim());
+      seconds > 0 ? h("label", { class: "switch" }, h("input", { type: "checkbox", name: "keep", checked: true }), h("span", {}, t("incident.pictures", { seconds }))) : null,
+    ], t("incident.keep"), async ({ text, keep }) => {
+      const marked = await api.markIncident(this.session.drone, text.trim(), keep !== undefined);
       close();
+      if (marked?.trouble) this.note(t("incident.no_pictures", { why: sentence(marked.trouble) }));
     }, [button(t("app.cancel"), null, { class: "plain", onclick: close })]), { modal: false });
   }
   update() {

@@ -9,6 +9,7 @@ import { LinkPanel, linkState } from "./link.js";
 import { ManualPanel } from "./manual.js";
 import { PlanPanel } from "./plan.js";
 import { PolarPanel } from "./polar.js";
+import { RecordBar } from "./record.js";
 import { WatchSession } from "./session.js";
 import { SituationPanel } from "./situation.js";
 import { EventsPanel, GaugesPanel, LossesPanel, RoundPanel } from "./status.js";
@@ -46,20 +47,22 @@ export function alarmElsewhere() {
   return { element: alarm.element, end: () => clearInterval(timer) };
 }
 
-export function watchView(drone, { account, drones }) {
+export function watchView(drone, { account, drones, recording = { keeps: false } }) {
   const session = sessionFor(drone, account);
   watched += 1;
   const plan = new PlanPanel(session);
   const situation = new SituationPanel(session);
   const alarm = new AlarmPanel(session);
   const video = new VideoPanel(session);
+  const record = new RecordBar(session, recording);
+  video.element.append(record.element);
   const gauges = new GaugesPanel(session);
   const losses = new LossesPanel(session);
   const round = new RoundPanel(session);
   const events = new EventsPanel(session);
   const polar = new PolarPanel(session);
   const link = new LinkPanel(session, drones);
-  const dock = new DockPanel(session, plan, { sticks: () => setManual(!manual) });
+  const dock = new DockPanel(session, plan, { sticks: () => setManual(!manual), keeps: recording });
   const manualPlace = h("div", { class: "manual-place" });
   let manual = null;
 
@@ -108,11 +111,11 @@ export function watchView(drone, { account, drones }) {
     veil.textContent = state === "live" || state === "late" ? "" : t(`veil.${state}`);
     show(veil, veil.textContent !== "");
     show(polar.element, session.layers.has("polar"));
-    for (const panel of [alarm, situation, link, video, gauges, losses, round, events, polar, dock, manual]) panel?.update(now);
+    for (const panel of [alarm, situation, link, video, record, gauges, losses, round, events, polar, dock, manual]) panel?.update(now);
   }
   const dirty = () => { plan.dirty = true; };
   const listeners = [
-    ["about", () => plan.load()], ["about", update], ["link", update], ["layers", dirty], ["layers", update], ["pilot/state", update],
+    ["about", () => plan.load()], ["about", update], ["link", update], ["recording", update], ["layers", dirty], ["layers", update], ["pilot/state", update],
     ["navigation/patrol", dirty], ["navigation/grid", dirty], ["localization/particles", dirty], ["localization/pose", dirty], ["navigation/polar", () => polar.update()],
   ];
   for (const [name, handler] of listeners) session.addEventListener(name, handler);
