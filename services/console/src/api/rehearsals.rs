@@ -51,7 +51,7 @@ pub(super) async fn begin(asked: Asked) -> Result<Response<Body>, Refusal> {
     let about = about(&asked).await?;
     let vehicle = about["vehicle"]["name"].as_str().unwrap_or_default();
     // It becomes a word on a command line and a file's name.
-    if vehicle.is_empty()
+    if !vehicle.starts_with(|first: char| first.is_ascii_alphanumeric())
         || !vehicle.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_'))
     {
         return Err(Refusal::bad(format!("{} has not said what it flies with", asked.drone)));

@@ -155,7 +155,9 @@ fn check(reading: &Reading) -> Result<(), PlanError> {
         if shapes.len() > MAX_MENDED {
             return fail(field, &format!("{} of them", shapes.len()), "at most 256");
         }
-        if let Some(value) = shapes.iter().flatten().find(|value| !(value.abs() <= MAX_COORDINATE_M)) {
+        if let Some(value) =
+            shapes.iter().flatten().find(|value| !(-MAX_COORDINATE_M..=MAX_COORDINATE_M).contains(*value))
+        {
             return fail(field, value, "-10000 to 10000 m");
         }
     }
