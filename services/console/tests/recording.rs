@@ -85,7 +85,8 @@ fn read(bytes: &[u8]) -> (usize, usize, u64) {
     loop {
         while let Some(wanted) = demuxer.required_input() {
             let from = bytes.len().min(wanted.position as usize);
-            demuxer.handle_input(Input { position: wanted.position, data: &bytes[from..] });
+            let to = wanted.size.map_or(bytes.len(), |size| bytes.len().min(from + size));
+            demuxer.handle_input(Input { position: wanted.position, data: &bytes[from..to] });
         }
         let Some(sample) = demuxer.next_sample().unwrap() else { break };
         let nal = &bytes[sample.data_offset as usize..][..sample.data_size];

@@ -292,7 +292,8 @@ mod tests {
         loop {
             while let Some(wanted) = demuxer.required_input() {
                 let from = bytes.len().min(wanted.position as usize);
-                demuxer.handle_input(Input { position: wanted.position, data: &bytes[from..] });
+                let to = wanted.size.map_or(bytes.len(), |size| bytes.len().min(from + size));
+                demuxer.handle_input(Input { position: wanted.position, data: &bytes[from..to] });
             }
             let Some(sample) = demuxer.next_sample().unwrap() else { break };
             frames += 1;

@@ -4,8 +4,8 @@ use super::drone::Drone;
 use ipc_types::{Field, Format, Header, Video};
 use std::mem::offset_of;
 
-pub const SMALL: &[u8] = include_bytes!("../data/small.units");
-pub const LARGE: &[u8] = include_bytes!("../data/large.units");
+pub static SMALL: &[u8] = include_bytes!("../data/small.units");
+pub static LARGE: &[u8] = include_bytes!("../data/large.units");
 /// Between two pictures, nanoseconds.
 pub const FRAME_NS: u64 = 66_666_667;
 
