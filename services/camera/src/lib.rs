@@ -4,10 +4,13 @@
 //! frames ([`Source`]) and each becomes one access unit on `camera/video` ([`Encoder`]), with the time at which it was captured.
 //! When the last wish has expired nothing is captured and nothing encoded. A wish for stills alone takes one frame a second and
 //! makes a JPEG of it on `camera/still` ([`Stills`]); the encoder sleeps on.
+//!
+//! What the plan says that no camera may show is covered before anything is encoded ([`privacy`]).
 
 mod config;
 mod encoder;
 mod pattern;
+pub mod privacy;
 mod service;
 mod simulated;
 mod source;

@@ -1,10 +1,12 @@
 //! The service: wishes in, video and stills out.
 
 use crate::config::{FILE, TEST_PATTERN};
+use crate::privacy::{Privacy, Viewpoint};
 use crate::simulated::Simulated;
 use crate::source::{Frame, Pace, Source};
 use crate::{CameraConfig, EncodeError, Encoder, Pattern, STILL_FORMAT, StillError, Stills, Wishes, Y4m};
-use ipc_types::{Format, Still, Text, Video, Wish};
+use ipc_types::{Format, LocalizationState, Pose, Still, Text, Video, Wish};
+use manifest::CameraMount;
 use runtime::{Input, Output, Ports, Service, Start, StartError};
 use std::fmt::Write;
 
@@ -16,9 +18,37 @@ const CUT_NS: u64 = 5_000_000_000;
 /// A frame that comes so much before the second is over is taken for the next still: the one after it would be later by more.
 const STILL_EARLY_NS: u64 = 200_000_000;
 
+/// Of a camera whose vehicle does not say how it looks: nearly half of the way round.
+const WIDEST_RAD: f32 = 2.8;
+
+/// Where a picture of this time was taken, as far as the drone knows.
+fn viewpoint(pose: Option<&Pose>, mount: Option<&CameraMount>, capture_ns: u64) -> Option<Viewpoint> {
+    let pose = pose?;
+    let (sin, cos) = pose.heading_rad.sin_cos();
+    let (forward, left) = mount.map_or((0.0, 0.0), |mount| (mount.x_m, mount.y_m));
+    // The picture may be newer than the place or older: one is as bad as the other.
+    let age_s = (pose.estimated_ns.abs_diff(capture_ns) as f64 * 1e-9) as f32;
+    let state = LocalizationState::from_code(pose.state.to_le_bytes()[0]);
+    let known = state == Some(LocalizationState::Tracking) && pose.searching == 0;
+    known.then_some(Viewpoint {
+        x: pose.x_m + forward * cos - left * sin,
+        y: pose.y_m + forward * sin + left * cos,
+        heading: pose.heading_rad,
+        sigma_m: pose.sigma_m(),
+        sigma_rad: pose.heading_sigma_rad,
+        p_lost: pose.p_lost,
+        age_s,
+    })
+}
+
 /// Encodes what the source gives, while somebody wants it.
 pub struct Camera {
     wishes: Input<Wish>,
+    poses: Input<Pose>,
+    pose: Option<Pose>,
+    mount: Option<CameraMount>,
+    /// On a plan with privacy zones.
+    privacy: Option<Privacy>,
     videos: Output<Video>,
     stills: Output<Still>,
     source: Box<dyn Source>,
@@ -76,8 +106,14 @@ impl Service for Camera {
                 ));
             }
         };
+        let mount = start.vehicle.camera;
+        let view_rad = mount.map_or(WIDEST_RAD, |mount| mount.field_of_view_rad);
         Ok(Self {
             wishes: ports.input()?,
+            poses: ports.input()?,
+            pose: None,
+            mount,
+            privacy: Privacy::new(start.plan()?, &start.sidecar()?.privacy, view_rad),
             videos: ports.output()?,
             stills: ports.output()?,
             source,
@@ -100,6 +136,9 @@ impl Service for Camera {
         while let Some(wish) = self.wishes.receive() {
             self.state.take(&wish, now);
         }
+        while let Some(pose) = self.poses.receive() {
+            self.pose = Some(*pose);
+        }
         let wanted = self.state.wanted(now);
         let still = self.state.wants_still(now);
         let captured = wanted.or_else(|| still.then_some(STILL_FORMAT));
@@ -110,6 +149,13 @@ impl Service for Camera {
             return;
         };
         self.heard_ns = now;
+        let frame = match &mut self.privacy {
+            Some(privacy) => {
+                privacy.look(viewpoint(self.pose.as_ref(), self.mount.as_ref(), frame.capture_ns));
+                privacy.cover(frame)
+            }
+            None => frame,
+        };
         if let Some(format) = wanted {
             let cut = now < self.cut_until_ns;
             let bitrate = if cut { (format.bitrate / CUT.1 * CUT.0).max(50_000) } else { format.bitrate };

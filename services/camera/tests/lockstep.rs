@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camera::{Camera, CameraConfig};
-use ipc_types::{Format, Still, Truth, Video, View, WISH_LIFE_NS, Wish};
+use ipc_types::{Format, LocalizationState, Pose, Still, Truth, Video, View, WISH_LIFE_NS, Wish};
 use openh264::decoder::Decoder;
 use openh264::formats::YUVSource;
 use runtime::{Cache, Input, Lockstep, Output, load_manifest};
@@ -19,6 +19,7 @@ struct Bench {
     views: Input<View>,
     decoder: Decoder,
     key_requests: u32,
+    poses: Option<Output<Pose>>,
 }
 
 /// What came within a while.
@@ -28,11 +29,16 @@ struct Seen {
     views: usize,
     decoded: usize,
     mean_luma: u64,
+    /// Between the darkest and the brightest pixel of the last picture.
+    spread: u8,
 }
 
 impl Bench {
     fn new(config: CameraConfig) -> Self {
-        let deploy = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy");
+        Self::of(config, &Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy"))
+    }
+
+    fn of(config: CameraConfig, deploy: &Path) -> Self {
         let (manifest, root) =
             load_manifest(&format!("{0}/system.toml:{0}/sim.toml", deploy.display())).unwrap();
         let mut bus = Lockstep::new(manifest, &root, 3, Cache::default());
@@ -42,7 +48,7 @@ impl Bench {
         bus.add_with::<Simulator>(Config::default()).unwrap();
         bus.add_with::<Scenery>(Config::default()).unwrap();
         bus.add_with::<Camera>(config).unwrap();
-        Self { bus, wishes, videos, views, decoder: Decoder::new().unwrap(), key_requests: 0 }
+        Self { bus, wishes, videos, views, decoder: Decoder::new().unwrap(), key_requests: 0, poses: None }
     }
 
     /// Runs on; with a format, somebody wishes for it all the time.
@@ -53,6 +59,20 @@ impl Bench {
                 let expiry_ns = self.bus.now() + 200 * MS;
                 let wish = Wish { format, expiry_ns, key_requests: self.key_requests, ..Wish::default() };
                 assert!(self.wishes.publish(&wish));
+            }
+            if let Some(poses) = &mut self.poses {
+                let pose = Pose {
+                    estimated_ns: self.bus.now(),
+                    x_m: 2.4,
+                    y_m: 2.2,
+                    heading_rad: core::f32::consts::FRAC_PI_2,
+                    variance_x_m2: 1e-3,
+                    variance_y_m2: 1e-3,
+                    heading_sigma_rad: 0.01,
+                    state: u32::from(LocalizationState::Tracking.code()),
+                    ..Pose::default()
+                };
+                assert!(poses.publish(&pose));
             }
             self.bus.run_until(self.bus.now() + 20 * MS);
             while let Some(video) = self.videos.receive() {
@@ -65,6 +85,8 @@ impl Bench {
                 if let Some(picture) = self.decoder.decode(video.access_unit()).unwrap() {
                     seen.decoded += 1;
                     let luma = picture.y();
+                    let (least, most) = luma.iter().fold((255, 0), |(a, b), v| (a.min(*v), b.max(*v)));
+                    seen.spread = most - least;
                     seen.mean_luma = luma.iter().map(|v| u64::from(*v)).sum::<u64>() / luma.len() as u64;
                 }
             }
@@ -224,4 +246,41 @@ fn stills_come_once_a_second_with_and_without_video() {
     let (taken, _) = film(&mut bench, hd, 0, 2);
     assert!(taken.is_empty(), "nobody asks for stills: {taken:?}");
     assert_eq!(bench.bus.refused("camera"), 0);
+}
+
+#[test]
+fn what_no_camera_may_show_is_grey_and_all_of_it_while_the_place_is_not_known() {
+    let directory = tempfile::tempdir().unwrap();
+    let deploy = directory.path();
+    for folder in ["config", "plans", "vehicles", "worlds"] {
+        let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy").join(folder);
+        std::fs::create_dir(deploy.join(folder)).unwrap();
+        for entry in std::fs::read_dir(from).unwrap().flatten() {
+            std::fs::copy(entry.path(), deploy.join(folder).join(entry.file_name())).unwrap();
+        }
+    }
+    for file in ["system.toml", "sim.toml"] {
+        std::fs::copy(
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy").join(file),
+            deploy.join(file),
+        )
+        .unwrap();
+    }
+    // The drone stands at (2.4, 2.2) and looks along y: the zone is all of the lobby before it, then a corner behind.
+    let flat = |seen: &Seen| seen.spread;
+    let film = |zone: &str, localized: bool| {
+        let side = deploy.join("plans/demo.rooms.yaml");
+        let text = std::fs::read_to_string(&side).unwrap();
+        let shipped = text.split("privacy:").next().unwrap();
+        std::fs::write(&side, format!("{shipped}privacy:\n  - {{name: Private, rectangle: {zone}}}\n"))
+            .unwrap();
+        let mut bench = Bench::of(CameraConfig::default(), deploy);
+        // What localization says of a drone that waits on its pad.
+        bench.poses = localized.then(|| bench.bus.tool("localization").output().unwrap());
+        bench.run(1000, None);
+        flat(&bench.run(1000, Some(SMALL)))
+    };
+    assert!(film("[0.2, 0.2, 1.0, 0.8]", true) > 60, "a zone behind the drone covers nothing");
+    assert!(film("[0.2, 0.2, 1.0, 0.8]", false) < 8, "nobody knows the place: all is covered");
+    assert!(film("[0.2, 2.5, 5.9, 5.9]", true) < 8, "before the drone: all is covered");
 }
