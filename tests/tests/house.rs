@@ -134,6 +134,7 @@ fn shells_keep_to_their_family() {
                 "image",
                 "ring",
                 "rusqlite",
+                "rustix",
                 "rustls",
                 "sd-notify",
                 "serde_json",
