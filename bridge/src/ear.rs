@@ -67,7 +67,7 @@ impl Ear {
                 let (TrySendError::Full(heard) | TrySendError::Disconnected(heard)) = error;
                 match heard {
                     Heard::Order { asker, .. } | Heard::Edit { asker, .. } => {
-                        self.refuse(asker, "too many orders at once")
+                        self.refuse(asker, "too many orders at once");
                     }
                     _ => self.lose(),
                 }

@@ -10,7 +10,7 @@ use runtime::{Start, StartError};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use supervisor::Client;
 
 /// A change on its way to the thread.
@@ -60,16 +60,15 @@ impl Editor {
         Ok(Self { tasks })
     }
 
-    /// Hands a change over.
-    ///
-    /// # Errors
-    /// Who asked and a sentence, while another is worked at.
-    pub fn take(&self, edit: Edit, asker: Asker) -> Result<(), (Asker, &'static str)> {
-        self.tasks.try_send(Task { edit, asker }).map_err(|error| {
-            let (std::sync::mpsc::TrySendError::Full(task)
-            | std::sync::mpsc::TrySendError::Disconnected(task)) = error;
-            (task.asker, "another change is being made")
-        })
+    /// Hands a change over; while another is worked at, who asked comes back, with a sentence.
+    #[must_use]
+    pub fn take(&self, edit: Edit, asker: Asker) -> Option<(Asker, &'static str)> {
+        match self.tasks.try_send(Task { edit, asker }) {
+            Ok(()) => None,
+            Err(TrySendError::Full(task) | TrySendError::Disconnected(task)) => {
+                Some((task.asker, "another change is being made"))
+            }
+        }
     }
 }
 

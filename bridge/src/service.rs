@@ -170,7 +170,7 @@ impl Bridge {
                     let refused = match decided {
                         Err(sentence) => Some((asker, sentence)),
                         Ok(edit) => {
-                            self.editor.take(edit, asker).err().map(|(asker, said)| (asker, said.to_owned()))
+                            self.editor.take(edit, asker).map(|(asker, said)| (asker, said.to_owned()))
                         }
                     };
                     if let Some((asker, sentence)) = refused {

@@ -138,6 +138,7 @@ fn shells_keep_to_their_family() {
                 "rustls",
                 "sd-notify",
                 "serde_json",
+                "shiguredo_mp4",
                 "tokio",
                 "tokio-rustls",
                 "tracing",

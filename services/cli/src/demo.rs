@@ -154,10 +154,17 @@ pub(crate) fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
     }
     let mut page = (!demo.once).then_some(&mut room);
     let flown = fly(place, demo, kills.as_mut(), page.as_deref_mut(), &stop, json);
-    let shown = flown.and_then(|(report, picture)| {
+    let shown = flown.and_then(|flown| {
+        let Some((report, picture)) = flown else {
+            // Somebody changed the building from the page: there is no round to report on.
+            if !json {
+                println!("\nThe drone was started anew on the way: this round is not measured.");
+            }
+            return Ok(None);
+        };
         std::fs::write(&demo.picture, picture).with_context(|| demo.picture.display().to_string())?;
         show(&report, demo, kills.as_ref(), json)?;
-        Ok(report)
+        Ok(Some(report))
     });
     if let (Ok(_), Some(room)) = (&shown, page) {
         stay(room, &mut system, &stop, json);
@@ -166,7 +173,7 @@ pub(crate) fn run(place: &Place, demo: &Demo, json: bool) -> Result<ExitCode> {
         companion.system.stop(&companion.place)?;
     }
     system.stop(place)?;
-    let report = shown?;
+    let Some(report) = shown? else { return Ok(ExitCode::SUCCESS) };
     let good = report.outcome == Outcome::LandedOnPad
         && report.contacts == 0
         && kills.as_ref().is_none_or(Kills::shrugged_off);
@@ -203,10 +210,11 @@ fn tell(room: &mut Room, json: bool) {
     }
 }
 
-/// Flies one round among processes that run already.
+/// Flies one round among processes that run already; `None` when the system was started anew on the way by somebody at the
+/// page, and nothing was measured.
 ///
 /// # Errors
-/// Also when the simulator was started again on the way: the drone then stands on the pad of a new world.
+/// Also when the simulator was started again and nobody is at the page: the drone then stands on the pad of a new world.
 fn fly(
     place: &Place,
     demo: &Demo,
@@ -214,7 +222,7 @@ fn fly(
     mut room: Option<&mut Room>,
     stop: &Interrupt,
     json: bool,
-) -> Result<(FlightReport, String)> {
+) -> Result<Option<(FlightReport, String)>> {
     let (manifest, root, run_dir) = place.running()?;
     let entry = manifest.services.get("simulator").context("the manifest has no simulator")?;
     let text = std::fs::read_to_string(root.join(&entry.config)).with_context(|| entry.config.clone())?;
@@ -236,6 +244,9 @@ fn fly(
         tool.tick();
         witness.look(&world);
         if witness.last_truth.is_some_and(|truth| truth.header.incarnation > 0) {
+            if room.is_some() {
+                return Ok(None);
+            }
             bail!(
                 "the simulator was started again in flight, and its world with it: what was flown proves nothing"
             );
@@ -280,7 +291,7 @@ fn fly(
         labels: &names,
     };
     let drawn = picture.draw();
-    Ok((score.report, drawn))
+    Ok(Some((score.report, drawn)))
 }
 
 fn line(witness: &Witness, elapsed: Duration, json: bool) {

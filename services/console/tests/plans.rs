@@ -134,7 +134,7 @@ async fn what_is_no_picture_is_refused_in_a_sentence_and_nothing_else_suffers() 
     flipped[middle] ^= 0xff;
     let cases: Vec<(&str, Vec<u8>, u16, &str)> = vec![
         ("nothing", Vec::new(), 400, none),
-        ("junk", (0..50_000_u32).map(|k| (k * k >> 7) as u8).collect(), 400, none),
+        ("junk", (0..50_000_u32).map(|k| ((k * k) >> 7) as u8).collect(), 400, none),
         ("text", b"{\"picture\":true}".to_vec(), 400, none),
         ("another format", b"GIF89a\x10\x00\x10\x00\x00\x00\x00;".to_vec(), 400, none),
         ("half a PNG", good[..good.len() / 2].to_vec(), 400, none),
