@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "tests")]
 
 mod browser;
+mod recording;
 mod rig;
 
 use browser::Guard;
@@ -211,4 +212,27 @@ async fn a_browser_that_dies_lets_the_drone_hover_and_holds_nothing() {
     println!("silent {silent:?}, free {free:?} after the browser was killed");
     assert!(free >= Duration::from_millis(500), "a lease outlives a hiccup");
     assert_eq!(drone.look().0, Some(Phase::Hover));
+}
+
+/// A browser without H.264 says so in words, and shows a still a second with its age in place of the video.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_browser_without_h264_is_shown_stills_and_told_why() {
+    let rig = Rig::start();
+    let guard = Guard::open(&rig.address).await;
+    let vp8 = "{ codecs: [{ mimeType: 'video/VP8', clockRate: 90000 }], headerExtensions: [] }";
+    guard.look(&format!("(RTCRtpReceiver.getCapabilities = () => ({vp8}), true)")).await;
+    claim(&guard, &rig).await;
+    let image = "document.querySelector('.video-stage img')";
+    guard.until("a still is shown", &format!("{image}.naturalWidth === 640 && !{image}.hidden"), LONG).await;
+    let says = |words: &str| format!("document.querySelector('.video-panel').innerText.includes({words:?})");
+    guard.until("it says why", &says("no decoder for H.264"), LONG).await;
+    guard.until("and how old the picture is", &says(" s old"), LONG).await;
+    guard.look(&format!("(sereno.first = {image}.src)")).await;
+    let another = format!("sereno.first !== {image}.src && {image}.naturalWidth === 640");
+    guard.until("the next still comes", &another, LONG).await;
+    assert_eq!(guard.look("document.querySelector('.video-stage video').hidden").await, true);
+    guard.picture("stills-desk").await;
+    guard.size(390, 844).await;
+    guard.picture("stills-phone").await;
+    guard.close().await;
 }
