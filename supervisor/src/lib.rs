@@ -14,6 +14,7 @@
 //! everything from shared memory and the run directory; the second one stops at once. Should this process die instead,
 //! its warden does the same.
 
+mod above;
 mod child;
 pub mod client;
 mod control;

@@ -1,6 +1,7 @@
 //! How a system is to be run.
 
 use crate::SupervisorError;
+use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -60,14 +61,21 @@ impl Default for Options {
     }
 }
 
-/// Where a system called `name` lives unless told otherwise: below `$XDG_RUNTIME_DIR`, for root below `/run`,
-/// else in a directory of the user's own below the temporary directory.
+/// What systemd makes for an installed system's user (`deploy/systemd/sereno.service`).
+const INSTALLED: &str = "/run/sereno";
+
+/// Where a system called `name` lives unless told otherwise: below `/run/sereno` for root and for the user of an installed
+/// system, to whom that belongs; below `$XDG_RUNTIME_DIR`; else in a directory of the user's own below the temporary
+/// directory.
 #[must_use]
 pub fn default_run_dir(name: &str) -> PathBuf {
     let user = rustix::process::geteuid();
+    if std::fs::metadata(INSTALLED).is_ok_and(|place| place.is_dir() && place.uid() == user.as_raw()) {
+        return PathBuf::from(INSTALLED).join(name);
+    }
     match std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from) {
         Some(dir) if dir.is_absolute() && dir.is_dir() => dir.join("sereno").join(name),
-        _ if user.is_root() => PathBuf::from("/run/sereno").join(name),
+        _ if user.is_root() => PathBuf::from(INSTALLED).join(name),
         _ => std::env::temp_dir().join(format!("sereno-{}", user.as_raw())).join(name),
     }
 }

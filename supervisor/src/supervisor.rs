@@ -2,6 +2,7 @@
 
 mod requests;
 
+use crate::above::Above;
 use crate::child::{Child, Surroundings};
 use crate::control::Control;
 use crate::error::while_doing;
@@ -141,8 +142,10 @@ impl<S: SharedMemory> Supervisor<S> {
         }
         let mut planned = Instant::now();
         let mut tidied = planned;
+        let mut above = Above::ready(planned);
         loop {
             let now = Instant::now();
+            above.beat(now);
             if now > planned + OVERSLEPT {
                 self.say(&format!("overslept by {} ms", (now - planned).as_millis()));
                 self.children.iter_mut().for_each(|child| child.life.forgive(now));
@@ -288,8 +291,10 @@ impl<S: SharedMemory> Supervisor<S> {
 
     /// A signal or a request to stop.
     fn stop_wanted(&mut self, at_once: bool, now: Instant) {
+        Above::stopping("stopping");
         self.phase = match self.phase {
             Phase::Running if self.shared.airborne() && !at_once => {
+                Above::status("landing");
                 self.say("landing first; a second signal stops at once");
                 Phase::Landing(Landing::new(self.options.land_limit, order_number(), now))
             }
