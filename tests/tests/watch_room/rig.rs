@@ -41,12 +41,21 @@ pub(crate) struct Rig {
 impl Rig {
     /// Everything but a browser.
     pub(crate) fn start() -> Self {
+        let mut rig = Self::start_with(|_, _| {});
+        rig.wait_running();
+        rig.open();
+        rig
+    }
+
+    /// The system alone, with files changed that are in its deploy directory, and its run directory. Nothing is waited for.
+    pub(crate) fn start_with(change: impl FnOnce(&Path, &Path)) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let directory = tempfile::tempdir().unwrap();
         let deploy = lightly_cluttered(directory.path(), "two-rooms").unwrap();
         let run_dir = directory.path().join("run");
+        change(&deploy, &run_dir);
         let up = sereno(&deploy, &run_dir, &["up", "--sim", "--quiet"]).stdin(Stdio::null()).spawn().unwrap();
-        let mut rig = Self {
+        Self {
             directory,
             deploy,
             up,
@@ -54,18 +63,21 @@ impl Rig {
             address: String::new(),
             claim: String::new(),
             _turn: turn,
-        };
+        }
+    }
+
+    /// Waits until every service runs.
+    pub(crate) fn wait_running(&self) {
         wait_until("everything runs", || {
-            let rows = supervisor::Client::connect(&rig.run_dir()).and_then(|mut client| client.ps());
+            let rows = supervisor::Client::connect(&self.run_dir()).and_then(|mut client| client.ps());
             rows.is_ok_and(|all| {
                 !all.services.is_empty() && all.services.iter().all(|row| row.state == "running")
             })
         });
-        rig.open();
-        rig
     }
 
-    fn open(&mut self) {
+    /// Starts the console.
+    pub(crate) fn open(&mut self) {
         let config = self.deploy.join("config/console.toml");
         let text = std::fs::read_to_string(&config).unwrap().replace("127.0.0.1:8443", "127.0.0.1:0");
         std::fs::write(&config, text).unwrap();
