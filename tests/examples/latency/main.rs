@@ -31,6 +31,8 @@ use tap::{Tap, now_ms};
 /// Yaw in SET_RAW_RC (AETR, FACTS 1) and the arm switch.
 const YAW: usize = 3;
 const AUX1: usize = 4;
+/// How long the button that cuts the motors is held (`watch/dock.js`), milliseconds.
+const HOLD_MS: f64 = 1000.0;
 /// A stick at two fifths moves the yaw channel by more at once.
 const MOVED_US: u16 = 30;
 
@@ -103,8 +105,8 @@ async fn main() {
     // The cut: the button is held for a second, and then the drone falls.
     let button = "[...document.querySelectorAll('button')].find((b) => b.innerText.includes('Cut motors'))";
     let hold = format!(
-        "(({button}).dispatchEvent(new PointerEvent('pointerdown', {{ bubbles: true, pointerId: 1, button: 0, isPrimary: true }})), \
-         performance.timeOrigin + performance.now())"
+        "(sereno.pressed = performance.timeOrigin + performance.now(), ({button}).dispatchEvent(new PointerEvent('pointerdown', \
+         {{ bubbles: true, pointerId: 1, button: 0, isPrimary: true }})), sereno.pressed)"
     );
     let held_ms = guard.look(&hold).await.as_f64().unwrap_or(f64::NAN);
     let began = Instant::now();
@@ -115,10 +117,10 @@ async fn main() {
     let disarmed =
         tap.since(held_ms).into_iter().find(|frame| frame.channels.get(AUX1).is_some_and(|us| *us < 1300));
     match disarmed {
-        Some(frame) => println!(
-            "cut: button down to the frame that disarms {:.1} ms, of which 1000 ms are the hold",
-            frame.at_ms - held_ms
-        ),
+        Some(frame) => {
+            let after = frame.at_ms - held_ms - HOLD_MS;
+            println!("cut: end of the hold of 1 s to the frame that disarms {after:.1} ms");
+        }
         None => println!("cut: no frame that disarms was seen"),
     }
     guard.close().await;
