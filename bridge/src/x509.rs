@@ -50,6 +50,19 @@ pub fn facts(file: &str, pem: &str) -> Result<Facts, String> {
     })
 }
 
+/// The SHA-256 of the first certificate of a PEM text, in sixteen groups of four hexadecimal digits; `file` as in [`facts`].
+///
+/// # Errors
+/// One sentence naming the file.
+pub fn fingerprint(file: &str, pem: &str) -> Result<String, String> {
+    let (_, block) = parse_x509_pem(pem.as_bytes())
+        .map_err(|error| format!("{file}: no certificate in PEM form: {error}"))?;
+    let digest = ring::digest::digest(&ring::digest::SHA256, &block.contents);
+    let groups = digest.as_ref().chunks(2);
+    let groups = groups.map(|pair| pair.iter().map(|byte| format!("{byte:02X}")).collect::<String>());
+    Ok(groups.collect::<Vec<_>>().join(" "))
+}
+
 fn address(bytes: &[u8]) -> Option<String> {
     if let Ok(four) = <[u8; 4]>::try_from(bytes) {
         return Some(std::net::Ipv4Addr::from(four).to_string());

@@ -132,6 +132,7 @@ fn shells_keep_to_their_family() {
                 "hyper",
                 "hyper-util",
                 "image",
+                "qrcode",
                 "ring",
                 "rusqlite",
                 "rustix",

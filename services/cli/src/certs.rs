@@ -75,7 +75,12 @@ enum CertsOrder {
         /// Only print what to run.
         #[arg(long)]
         print: bool,
+        /// Trust nothing here; print a QR code that leads a phone to this address: https://HOST/trust of the console.
+        #[arg(long, value_name = "ADDRESS", conflicts_with = "print")]
+        qr: Option<String>,
     },
+    /// Print the authority's SHA-256 in sixteen groups, to be compared with what a phone or browser is shown at /trust.
+    Fingerprint,
     /// No longer.
     Untrust {
         /// Only print what to run.
@@ -108,6 +113,15 @@ fn endpoints(authority: &Authority, given: &[String]) -> Result<Vec<String>> {
         found.push("tls/127.0.0.1:7447".to_owned());
     }
     Ok(found)
+}
+
+/// The authority's own certificate: its file and what is in it.
+fn certificate(authority: &Authority) -> Result<(PathBuf, String)> {
+    let ca = authority.directory().join("ca.pem");
+    let text = std::fs::read_to_string(&ca).map_err(|error| {
+        anyhow::anyhow!("cannot read {}: {error}: `sereno certs init` makes it", ca.display())
+    })?;
+    Ok((ca, text))
 }
 
 pub(crate) fn run(place: &Place, certs: &Certs, json: bool) -> Result<ExitCode> {
@@ -193,11 +207,18 @@ pub(crate) fn run(place: &Place, certs: &Certs, json: bool) -> Result<ExitCode> 
             authority.page(hosts, now)?;
             said.push(format!("the page's certificate is for localhost, 127.0.0.1, ::1 {}", hosts.join(" ")));
         }
-        CertsOrder::Trust { print } | CertsOrder::Untrust { print } => {
-            let ca = authority.directory().join("ca.pem");
-            let text = std::fs::read_to_string(&ca).map_err(|error| {
-                anyhow::anyhow!("cannot read {}: {error}: `sereno certs init` makes it", ca.display())
-            })?;
+        CertsOrder::Fingerprint => {
+            let (_, text) = certificate(&authority)?;
+            said.push(bridge::x509::fingerprint("ca.pem", &text).map_err(anyhow::Error::msg)?);
+        }
+        CertsOrder::Trust { qr: Some(address), .. } => {
+            print!("{}", trust::code(address)?);
+            let (_, text) = certificate(&authority)?;
+            said.push(address.clone());
+            said.push(bridge::x509::fingerprint("ca.pem", &text).map_err(anyhow::Error::msg)?);
+        }
+        CertsOrder::Trust { print, .. } | CertsOrder::Untrust { print } => {
+            let (ca, text) = certificate(&authority)?;
             let facts = bridge::x509::facts(&ca.display().to_string(), &text).map_err(anyhow::Error::msg)?;
             trust::run(&ca, &facts.name, matches!(certs.order, CertsOrder::Trust { .. }), *print)?;
             return Ok(ExitCode::SUCCESS);

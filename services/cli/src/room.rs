@@ -178,6 +178,7 @@ impl Room {
             https.insert("listen".into(), format!("127.0.0.1:{port}").into());
             https.insert("certificate".into(), text(&certs.join("https.pem")));
             https.insert("key".into(), text(&certs.join("https.key")));
+            https.insert("authority".into(), text(&certs.join("ca.pem")));
         }
         if let Some(toml::Value::Table(zenoh)) = table.get_mut("zenoh") {
             zenoh.insert("client".into(), text(&certs.join("clients/console/console.json5")));

@@ -102,6 +102,18 @@ pub(crate) fn run(ca: &Path, name: &str, trust: bool, print: bool) -> Result<()>
     Ok(())
 }
 
+/// A QR code for a terminal, of the address where a console tells devices how to trust it.
+pub(crate) fn code(address: &str) -> Result<String> {
+    if !address.starts_with("https://") || address.len() > 300 || address.contains(char::is_whitespace) {
+        bail!("--qr {address}: allowed is an address that begins with https://, at most 300 bytes");
+    }
+    let code = qrcode::QrCode::new(address).context("this address makes no QR code")?;
+    let mut picture = code.render::<qrcode::render::unicode::Dense1x2>();
+    // Terminals are dark as a rule, and cameras want the code dark on light.
+    let (dark, light) = (qrcode::render::unicode::Dense1x2::Light, qrcode::render::unicode::Dense1x2::Dark);
+    Ok(format!("{}\n", picture.dark_color(dark).light_color(light).build()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,6 +140,10 @@ mod tests {
                 "certutil -d sql:/home/ana/.pki/nssdb -D -n 'Sereno x 12'",
             ]
         );
+        for wrong in ["", "http://a/trust", "https://a b", &format!("https://{}", "a".repeat(300))] {
+            assert!(code(wrong).is_err(), "{wrong}");
+        }
+        assert!(code("https://drone.local/trust").is_ok_and(|code| code.lines().count() > 12));
         assert!(Machine::default().steps(Path::new("ca.pem"), "x", true).is_empty());
     }
 }

@@ -1,5 +1,6 @@
 //! What every request shares.
 
+use crate::authority::Authority;
 use crate::backoff::Backoff;
 use crate::fleet::Fleet;
 use crate::page::Page;
@@ -47,6 +48,8 @@ pub struct App {
     pub(crate) store: Store,
     pub(crate) fleet: Arc<Fleet>,
     pub(crate) page: Page,
+    /// What devices are to trust, if anything.
+    pub(crate) authority: Option<Authority>,
     pub(crate) drafts: Drafts,
     pub(crate) rehearsals: Rehearsals,
     pub(crate) clock: Arc<dyn Clock>,
@@ -62,7 +65,7 @@ impl App {
     pub(crate) fn new(
         store: Store,
         fleet: Arc<Fleet>,
-        page: Page,
+        (page, authority): (Page, Option<Authority>),
         (drafts, rehearsals): (Drafts, Rehearsals),
         clock: Arc<dyn Clock>,
         directory: Directory,
@@ -72,6 +75,7 @@ impl App {
             store,
             fleet,
             page,
+            authority,
             drafts,
             rehearsals,
             clock,

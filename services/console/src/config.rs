@@ -51,6 +51,9 @@ pub struct HttpsConfig {
     pub certificate: PathBuf,
     /// Its private key, PEM.
     pub key: PathBuf,
+    /// The certificate of the authority that signed it, PEM, to be offered to devices that are to trust it; absent: none is.
+    #[serde(default)]
+    pub authority: Option<PathBuf>,
     /// Connections at the same time.
     pub connections: usize,
     /// Of them from one address.
@@ -135,7 +138,9 @@ impl ConsoleConfig {
         {
             *file = folder.join(&*file);
         }
-        for file in [&mut config.rehearsal.program, &mut config.rehearsal.deploy].into_iter().flatten() {
+        let optional =
+            [&mut config.rehearsal.program, &mut config.rehearsal.deploy, &mut config.https.authority];
+        for file in optional.into_iter().flatten() {
             *file = folder.join(&*file);
         }
         Ok(config)

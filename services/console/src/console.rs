@@ -1,6 +1,7 @@
 //! A running console.
 
 use crate::app::{App, Clock, random};
+use crate::authority::Authority;
 use crate::config::ConsoleConfig;
 use crate::fleet::Fleet;
 use crate::gate;
@@ -11,7 +12,7 @@ use crate::secret::{CLAIM_CHARACTERS, claim_code, claim_digest};
 use crate::server::{self, Places};
 use crate::store::Store;
 use crate::tls::Certificate;
-use crate::{CertificateError, Directory, LinkError, StoreError, password};
+use crate::{AuthorityError, CertificateError, Directory, LinkError, StoreError, password};
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -27,6 +28,9 @@ pub enum StartError {
     /// The page's certificate.
     #[error(transparent)]
     Certificate(#[from] CertificateError),
+    /// What devices are to trust.
+    #[error(transparent)]
+    Authority(#[from] AuthorityError),
     /// The way to the drones.
     #[error(transparent)]
     Link(#[from] LinkError),
@@ -65,6 +69,7 @@ impl Console {
     ) -> Result<Self, StartError> {
         let store = Store::open(&config.data)?;
         let certificate = Arc::new(Certificate::read(&config.https.certificate, &config.https.key)?);
+        let authority = config.https.authority.as_deref().map(Authority::read).transpose()?;
         let tls = TlsAcceptor::from(Arc::new(certificate.server()?));
         let listener =
             server::listen(config.https.listen).map_err(|error| StartError::System(error.to_string()))?;
@@ -93,7 +98,7 @@ impl Console {
         .await?;
         let rehearsals = Rehearsals::new(&config.rehearsal, &config.data);
         let plans = (Drafts::new(&config.data), rehearsals.clone());
-        let app = Arc::new(App::new(store, fleet, page, plans, clock, directory, decoy));
+        let app = Arc::new(App::new(store, fleet, (page, authority), plans, clock, directory, decoy));
         let places = Places::new(config.https.connections, config.https.connections_an_address);
         let mut tasks = vec![
             tokio::spawn(server::serve(listener, tls, places, gate::router(app))),

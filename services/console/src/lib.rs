@@ -5,6 +5,7 @@
 
 mod api;
 mod app;
+mod authority;
 mod backoff;
 mod config;
 mod console;
@@ -29,6 +30,7 @@ pub mod threads;
 mod tls;
 
 pub use app::{App, Clock, SystemClock};
+pub use authority::AuthorityError;
 pub use backoff::{Backoff, LONGEST_MS};
 pub use config::{ConfigError, ConsoleConfig, HttpsConfig, RehearsalConfig, SessionConfig, ZenohConfig};
 pub use console::{Console, StartError, claim_again};

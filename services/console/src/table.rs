@@ -38,6 +38,10 @@ pub enum Names {
 pub enum Action {
     Index,
     App,
+    Trust,
+    AuthorityFile,
+    SeeTrust,
+    TrustCode,
     SeeSession,
     Claim,
     LogIn,
@@ -132,6 +136,10 @@ const ADMINISTRATOR: Least = Least::Account(Role::Administrator);
 pub const ROUTES: &[Route] = &[
     route(Method::Get,   "/",                            Least::Anybody, Names::NoDrone, Action::Index),
     route(Method::Get,   "/app/{*path}",                 Least::Anybody, Names::NoDrone, Action::App),
+    route(Method::Get,   "/trust",                       Least::Anybody, Names::NoDrone, Action::Trust),
+    route(Method::Get,   "/trust/sereno-ca.crt",         Least::Anybody, Names::NoDrone, Action::AuthorityFile),
+    route(Method::Get,   "/api/trust",                   ADMINISTRATOR,  Names::NoDrone, Action::SeeTrust),
+    route(Method::Get,   "/api/trust/qr.svg",            ADMINISTRATOR,  Names::NoDrone, Action::TrustCode),
     route(Method::Get,   "/api/session",                 Least::Anybody, Names::NoDrone, Action::SeeSession),
     route(Method::Post,  "/api/claim",                   Least::Anybody, Names::NoDrone, Action::Claim),
     route(Method::Post,  "/api/login",                   Least::Anybody, Names::NoDrone, Action::LogIn),

@@ -7,6 +7,7 @@ mod plans;
 mod recordings;
 mod rehearsals;
 mod reports;
+mod trust;
 
 use crate::gate::Asked;
 use crate::refusal::Refusal;
@@ -21,6 +22,10 @@ pub(crate) async fn act(action: Action, asked: Asked) -> Result<Response<Body>, 
             let name = asked.path.get("path").map_or("", String::as_str);
             page(&asked, &format!("app/{name}"))
         }
+        Action::Trust => trust::page(&asked),
+        Action::AuthorityFile => trust::certificate(&asked),
+        Action::SeeTrust => Ok(trust::see(&asked)),
+        Action::TrustCode => trust::qr(&asked),
         Action::SeeSession => Ok(login::session(&asked)),
         Action::Claim => login::claim(asked).await,
         Action::LogIn => login::log_in(asked).await,

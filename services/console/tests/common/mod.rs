@@ -65,6 +65,7 @@ impl Bench {
                 redirect: None,
                 certificate: https.certificate,
                 key: https.key,
+                authority: None,
                 connections: 256,
                 connections_an_address: 200,
             },

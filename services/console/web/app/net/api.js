@@ -46,6 +46,8 @@ export const accounts = () => request("GET", "/api/accounts");
 export const createAccount = (form) => request("POST", "/api/accounts", form);
 export const changeAccount = (id, form) => request("PATCH", `/api/accounts/${path(id)}`, form);
 export const log = (before, limit) => request("GET", `/api/log?limit=${limit}${before ? `&before=${path(before)}` : ""}`);
+export const devices = () => request("GET", "/api/trust");
+export const devicesCodeUrl = "/api/trust/qr.svg";
 export const drones = () => request("GET", "/api/drones");
 export const about = (drone) => request("GET", `/api/drones/${path(drone)}/about`);
 /** `hash` tells one plan from the next, so that no old picture of it is shown. */

@@ -3,6 +3,7 @@
 import * as api from "../net/api.js";
 import { h, button, fill, icon } from "./dom.js";
 import { choice, field, form, newPassword, trouble } from "./form.js";
+import { openDevices } from "./devices.js";
 import { openDialog } from "./dialog.js";
 import { list } from "../pure/lists.js";
 import { t } from "../words/text.js";
@@ -100,7 +101,7 @@ export function accountsView(session) {
   load();
   return {
     element: h("div", { class: "page" },
-      h("div", { class: "page-head" }, h("div", {}, h("h1", {}, t("nav.accounts")), h("p", {}, t("accounts.words"))), button(t("accounts.new"), "plus", { class: "primary", onclick: create })),
+      h("div", { class: "page-head" }, h("div", {}, h("h1", {}, t("nav.accounts")), h("p", {}, t("accounts.words"))), h("div", { class: "actions" }, button(t("devices.open"), "shield", { onclick: openDevices }), button(t("accounts.new"), "plus", { class: "primary", onclick: create }))),
       body),
     title: t("nav.accounts"),
   };

@@ -85,6 +85,13 @@ export default {
   "accounts.new_password": "New password",
   "accounts.new_password_hint": "Leave it empty to keep the present one.",
 
+  "devices.open": "Phones: trust this page",
+  "devices.title": "Let a phone trust this page",
+  "devices.scan": "Scan it with the phone's camera, pass the browser's warning once, and compare these sixteen groups with what the phone shows.",
+  "devices.alt": "QR code of {address}",
+  "devices.local": "This address is this machine's own. Open the page by the name or address under which phones reach it, then look here again.",
+  "devices.none": "This console names no authority of its own (https.authority in its configuration): its certificate is the owner's affair.",
+
   "log.words": "Log-ins, log-outs, failed attempts and actions, newest first. Nothing here can be changed.",
   "log.none": "Nothing yet",
   "log.none_words": "What people do here will be listed.",

@@ -85,6 +85,13 @@ export default {
   "accounts.new_password": "Contraseña nueva",
   "accounts.new_password_hint": "Déjela vacía para conservar la actual.",
 
+  "devices.open": "Móviles: confiar en esta página",
+  "devices.title": "Que un móvil confíe en esta página",
+  "devices.scan": "Escanéelo con la cámara del móvil, pase una vez el aviso del navegador y compare estos dieciséis grupos con los que muestra el móvil.",
+  "devices.alt": "Código QR de {address}",
+  "devices.local": "Esta dirección es la de esta misma máquina. Abra la página con el nombre o la dirección por los que llegan los móviles y vuelva a mirar aquí.",
+  "devices.none": "Esta consola no indica ninguna autoridad propia (https.authority en su configuración): su certificado es cosa de su dueño.",
+
   "log.words": "Entradas, salidas, intentos fallidos y acciones, lo más reciente primero. Nada de esto se puede modificar.",
   "log.none": "Aún no hay nada",
   "log.none_words": "Aquí aparecerá lo que se haga en la sala.",
