@@ -66,6 +66,11 @@ impl Line {
         }
     }
 
+    /// Nothing is sent, as there is nothing to send: a viewer that gets nothing has nothing to report.
+    pub fn idle(&mut self, now: Duration) {
+        self.heard = now;
+    }
+
     /// How long nothing was heard.
     #[must_use]
     pub fn silence(&self, now: Duration) -> Duration {
@@ -147,6 +152,18 @@ mod tests {
         assert!(line.is_left_out(), "on probation");
         line.report(seconds(113), &GOOD);
         assert!(!line.is_left_out());
+    }
+
+    #[test]
+    fn whoever_is_sent_nothing_is_not_taken_for_stalled() {
+        let mut line = Line::new(BOUNDS, seconds(0));
+        for now in 0..60 {
+            line.idle(seconds(now));
+            line.tick(seconds(now));
+            assert!(!line.is_left_out() && line.silence(seconds(now)) == Duration::ZERO);
+        }
+        line.tick(seconds(62));
+        assert!(line.is_left_out());
     }
 
     #[test]

@@ -11,6 +11,9 @@ use tokio::time::Instant;
 /// Key frames are asked for once in so long by one viewer.
 const KEY_PAUSE: Duration = Duration::from_millis(300);
 
+/// Without a frame for so long there are none: the camera is away.
+const NO_PICTURES: Duration = Duration::from_millis(1500);
+
 /// What the hub reads of a line.
 #[derive(Debug, Default)]
 pub(crate) struct LineState {
@@ -40,6 +43,8 @@ pub(crate) struct Viewer {
     /// What came since then cannot be decoded without a key frame.
     needs_key: bool,
     asked: Option<Instant>,
+    /// When there was last a frame for it.
+    offered: Duration,
     /// Frames lost so far, of those that were looked at.
     lost: u64,
 }
@@ -47,7 +52,15 @@ pub(crate) struct Viewer {
 impl Viewer {
     pub(crate) fn new(call: &Call, ends: &Ends) -> Self {
         let bounds = bounds(call, ends);
-        Self { began: Instant::now(), bounds, line: None, needs_key: true, asked: None, lost: 0 }
+        Self {
+            began: Instant::now(),
+            bounds,
+            line: None,
+            needs_key: true,
+            asked: None,
+            offered: Duration::ZERO,
+            lost: 0,
+        }
     }
 
     pub(crate) fn is_connected(&self) -> bool {
@@ -90,6 +103,9 @@ impl Viewer {
     pub(crate) fn silence(&mut self, ends: &Ends) -> Duration {
         let now = self.began.elapsed();
         let Some(line) = &mut self.line else { return Duration::ZERO };
+        if now.saturating_sub(self.offered) > NO_PICTURES {
+            line.idle(now);
+        }
         line.tick(now);
         let silence = line.silence(now);
         self.show(ends);
@@ -109,6 +125,7 @@ impl Viewer {
     pub(crate) fn gets(&mut self, unit: &Unit, ends: &Ends) -> bool {
         let before = std::mem::replace(&mut self.lost, ends.dropped.load(Ordering::Relaxed));
         let now = self.began.elapsed();
+        self.offered = now;
         if self.lost != before {
             if let Some(line) = &mut self.line {
                 line.jam(now);

@@ -112,6 +112,7 @@ fn eight_viewers_one_stalled(by: By) {
         }
         marks.push((how_far.to_owned(), state));
     });
+    assert!(watched.errors().is_empty(), "{:?}", watched.errors());
     let at = |name: &str| marks.iter().find(|(how_far, _)| how_far == name).unwrap().1;
     let (begin, end) = (at("begin"), at("end"));
     let encoded = end.encoded - begin.encoded;

@@ -53,6 +53,7 @@ publishes.'camera/still' = { hz = 0 }
 publishes.'sim/shutter' = { hz = 15 }
 subscribes.'camera/wish' = { depth = 8, wake = true }
 subscribes.'camera/picture' = { depth = 1, wake = true }
+subscribes.'localization/pose' = { depth = 4 }
 [service.stream]
 run = "sereno-stream"
 config = "config/stream.toml"
@@ -72,6 +73,7 @@ tick_hz = 1
 publishes.'sim/ping' = { hz = 0 }
 publishes.'flight/state' = { hz = 0 }
 publishes.'pilot/state' = { hz = 0 }
+publishes.'localization/pose' = { hz = 0 }
 [tool.viewer]
 publishes = ["signal/in"]
 "#;
