@@ -3,6 +3,7 @@
 
 use ipc_types::{Format, Wish};
 use serde::Deserialize;
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Longest JSON of a wish, bytes.
@@ -78,8 +79,10 @@ impl Wishes {
     /// # Errors
     /// One sentence; the wish before it stands until it ends.
     pub fn take(&mut self, now: u64, certificate: &str, json: &[u8]) -> Result<(), String> {
-        let raw: Raw =
-            serde_json::from_slice(json).map_err(|error| format!("the wish is not understood: {error}"))?;
+        let wrong = |error: serde_json::Error| format!("the wish is not understood: {error}");
+        // A list would do for a structure, too.
+        let fields: serde_json::Map<String, Value> = serde_json::from_slice(json).map_err(wrong)?;
+        let raw = Raw::deserialize(Value::Object(fields)).map_err(wrong)?;
         let format = raw.video.as_ref().map(RawVideo::format).transpose()?;
         self.kept.retain(|_, kept| now < kept.until_ns);
         if format.is_none() && !raw.still {

@@ -26,6 +26,8 @@ export function play(drone, one) {
   openDialog(nameOf(one), () => {
     const told = h("p", { class: "note bad", role: "alert", hidden: true }, icon("alert"), h("span", {}, t("recordings.unplayable")));
     const film = h("video", { class: "film", controls: true, playsinline: true, autoplay: true, src: api.filmUrl(drone, one.id), "aria-label": t("recordings.film", { drone, when: nameOf(one) }) });
+    // It has no sound, and browsers let the silent play at once.
+    film.muted = true;
     film.addEventListener("error", () => { told.hidden = false; });
     return h("div", { class: "film-place" }, film, told);
   });
