@@ -123,7 +123,7 @@ impl Thread {
 
     fn work(&mut self, work: Work) {
         match work {
-            Work::Picture { drone, unit } => self.picture(&drone, Arc::new(*unit)),
+            Work::Picture { drone, unit } => self.picture(&drone, &Arc::new(*unit)),
             Work::Roll { drone, on } => self.roll(&drone, on),
             Work::Start { drone, account, answer } => {
                 // Who asked may have gone, here and below.
@@ -201,32 +201,32 @@ impl Thread {
         let place = self.places.entry(drone.clone()).or_insert_with(Place::new);
         match (&place.ring, on) {
             (None, true) if rings < MOST_RINGS && span_ns > 0 => {
-                place.ring = Some(Ring::new(span_ns, RING_BYTES))
+                place.ring = Some(Ring::new(span_ns, RING_BYTES));
             }
             (Some(_), false) => place.ring = None,
             _ => {}
         }
     }
 
-    fn picture(&mut self, drone: &Arc<str>, unit: Arc<Unit>) {
+    fn picture(&mut self, drone: &Arc<str>, unit: &Arc<Unit>) {
         let now_ms = self.desk.clock.now_ms();
         let Some(place) = self.places.get_mut(drone) else { return };
         place.heard = Instant::now();
         let asked = place.key_requests;
-        if place.follows(&unit) {
+        if place.follows(unit) {
             if let Some(ring) = &mut place.ring {
-                ring.push(&unit);
+                ring.push(unit);
             }
             let mut trouble = None;
             if let Some((_, take)) = &mut place.recording
-                && let Err(why) = take.push(&self.desk, &unit, now_ms)
+                && let Err(why) = take.push(&self.desk, unit, now_ms)
             {
                 trouble = Some(why);
                 place.recording = None;
             }
             let desk = &self.desk;
             place.clips.retain_mut(|(_, take)| {
-                let kept = take.push(desk, &unit, now_ms);
+                let kept = take.push(desk, unit, now_ms);
                 kept.inspect_err(|why| trouble = Some(why.clone())).is_ok()
             });
             if let Some(why) = trouble {
