@@ -6,7 +6,7 @@ use crate::order::OrderText;
 use ipc_types::{Field, Message, Particles, TopicVisitor, Verb, visit_topic};
 use serde_json::Value;
 use std::path::Path;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 use zenoh::handlers::FifoChannel;
 use zenoh::{Config, Session, Wait};
@@ -108,6 +108,22 @@ impl Remote {
             .map_err(|error| format!("{} says no JSON of itself: {error}", self.drone))
     }
 
+    /// The plan as PNG, pixel for pixel of the map file.
+    ///
+    /// # Errors
+    /// When the drone does not answer.
+    pub fn plan(&self) -> Result<Vec<u8>, String> {
+        self.ask(&self.keys.plan(), None, PATIENCE)
+    }
+
+    /// Says which pictures are wanted, for two seconds (`docs/off-board.md`, *Video*).
+    ///
+    /// # Errors
+    /// When zenoh refuses.
+    pub fn wish(&self, json: &str) -> Result<(), String> {
+        self.session.put(self.keys.wish(&self.certificate), json).wait().map_err(|error| said(&error))
+    }
+
     /// The first answer to a question.
     fn ask(&self, key: &str, payload: Option<String>, patience: Duration) -> Result<Vec<u8>, String> {
         let mut question = self.session.get(key).with(FifoChannel::new(1)).timeout(patience);
@@ -162,20 +178,45 @@ impl Remote {
         self.messages(&self.keys.telemetry(topic))
     }
 
+    /// Messages of a topic into a queue that several topics share, with the topic's name, until what this returns is dropped.
+    /// Those that find the queue full are lost, as on board.
+    ///
+    /// # Errors
+    /// When zenoh refuses.
+    pub fn follow_into(&self, topic: &str, to: SyncSender<(String, Heard)>) -> Result<Following, String> {
+        let name = topic.to_owned();
+        let pass = move |heard| {
+            let _ = to.try_send((name.clone(), heard));
+        };
+        Ok(Following { _subscriber: self.subscribe(&self.keys.telemetry(topic), pass)? })
+    }
+
     fn messages(&self, key: &str) -> Result<Followed, String> {
         let (heard, messages) = sync_channel(WAITING);
-        let subscriber = self
-            .session
+        // Who does not look loses messages, as on board.
+        let subscriber = self.subscribe(key, move |message| drop(heard.try_send(message)))?;
+        Ok(Followed { messages, _subscriber: subscriber })
+    }
+
+    fn subscribe(
+        &self,
+        key: &str,
+        hear: impl Fn(Heard) + Send + Sync + 'static,
+    ) -> Result<zenoh::pubsub::Subscriber<()>, String> {
+        self.session
             .declare_subscriber(key)
             .callback(move |sample| {
                 let is_json = sample.encoding().to_string().starts_with("application/json");
-                // Who does not look loses messages, as on board.
-                let _ = heard.try_send(Heard { payload: sample.payload().to_bytes().into_owned(), is_json });
+                hear(Heard { payload: sample.payload().to_bytes().into_owned(), is_json });
             })
             .wait()
-            .map_err(|error| said(&error))?;
-        Ok(Followed { messages, _subscriber: subscriber })
+            .map_err(|error| said(&error))
     }
+}
+
+/// A topic that is followed for as long as this is there.
+pub struct Following {
+    _subscriber: zenoh::pubsub::Subscriber<()>,
 }
 
 /// Messages that come.

@@ -95,6 +95,8 @@ pub(crate) enum Verb {
         #[command(subcommand)]
         order: TopicOrder,
     },
+    /// Show a drone in the Foxglove app on this machine (with --remote): pose, particles, plan, round, sonars, video, all topics.
+    Foxglove(crate::live::Foxglove),
     /// Certificates of drones, programs and the page.
     Certs(crate::certs::Certs),
     /// Print the JSON schema of every topic.

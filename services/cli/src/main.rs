@@ -6,6 +6,7 @@ mod certs;
 mod check;
 mod demo;
 mod kills;
+mod live;
 mod operate;
 mod rehearse;
 mod remote;
@@ -49,6 +50,9 @@ fn main() -> ExitCode {
         }
         Verb::Automatic { switch } => operate::give(place, (*switch).into(), json),
         Verb::Topic { order } => topic::run(place, order, json),
+        Verb::Foxglove(_) => Err(anyhow::anyhow!(
+            "foxglove needs --remote FILE.json5, which `sereno certs client NAME` writes"
+        )),
         Verb::Certs(certs) => certs::run(place, certs, json),
         Verb::Schema => schema::run(),
         Verb::Graph => check::graph(place, json),
@@ -75,6 +79,7 @@ fn far(file: &std::path::Path, arguments: &Arguments) -> anyhow::Result<ExitCode
     use operate::Order;
     let json = arguments.json;
     let order = match &arguments.verb {
+        Verb::Foxglove(order) => return live::run(&connect(file, arguments)?, order, json),
         Verb::Topic { order } => {
             let remote = connect(file, arguments)?;
             return remote::topic(&remote, order, json);
@@ -89,7 +94,7 @@ fn far(file: &std::path::Path, arguments: &Arguments) -> anyhow::Result<ExitCode
         Verb::Cut { yes_it_falls } => Order::cut(*yes_it_falls)?,
         Verb::Automatic { switch } => (*switch).into(),
         _ => anyhow::bail!(
-            "this command is for the machine of the drone; over the network there are topic, takeoff, land, hold, goto, \
+            "this command is for the machine of the drone; over the network there are topic, foxglove, takeoff, land, hold, goto, \
              home, patrol, stop, cut and automatic"
         ),
     };

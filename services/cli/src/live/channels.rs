@@ -1,0 +1,219 @@
+//! What Foxglove is shown: a topic in its well-known form where there is one, and every JSON topic as it is.
+
+use super::clock::Clock;
+use super::scene::{self, Place};
+use super::schema::plain;
+use anyhow::{Context as _, Result};
+use bridge::form::decode_particles;
+use bridge::remote::Heard;
+use floorplan::{Plan, PlanHeader};
+use foxglove::messages::{
+    CompressedVideo, FrameTransform, Grid, PoseInFrame, PosesInFrame, SceneUpdate, Timestamp,
+};
+use foxglove::{Channel, Context, PartialMetadata, RawChannel, Schema};
+use ipc_types::{Message, Video};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// All channels, and what must be remembered to fill them.
+pub(crate) struct Channels {
+    /// Topics that leave as JSON, under their own names.
+    json: BTreeMap<String, Arc<RawChannel>>,
+    frame: Channel<FrameTransform>,
+    pose: Channel<PoseInFrame>,
+    uncertainty: Channel<SceneUpdate>,
+    particles: Channel<PosesInFrame>,
+    plan: Channel<Grid>,
+    certainty: Channel<Grid>,
+    sonar: Channel<SceneUpdate>,
+    route: Channel<SceneUpdate>,
+    video: Channel<CompressedVideo>,
+    drawn: Plan,
+    /// The newest round, which comes twice a second at most and is shown at once to who begins to watch it.
+    round: Value,
+    clock: Clock,
+    place: Option<Place>,
+    height_m: f64,
+}
+
+/// The plan as the drone tells it: its picture by what `about` says of it.
+fn plan_of(about: &Value, picture: &[u8]) -> Result<Plan> {
+    let number =
+        |key: &str| about["plan"][key].as_f64().with_context(|| format!("about: plan.{key} is no number"));
+    let header = format!(
+        "image: plan.png\nresolution: {}\norigin: [{}, {}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+        number("resolution_m")?,
+        number("origin_x_m")?,
+        number("origin_y_m")?
+    );
+    let header = PlanHeader::parse("about", header.as_bytes())?;
+    Ok(Plan::load("plan.png", &header, picture)?)
+}
+
+/// The schema of a topic by `sereno schema`; those of one service's health are alike.
+fn schema_of(schemas: &Value, topic: &str) -> Option<Value> {
+    let family = topic.split('/').next().unwrap_or(topic);
+    schemas["topics"].get(topic).or_else(|| schemas["topics"].get(family)).map(|row| plain(&row["schema"]))
+}
+
+impl Channels {
+    /// Advertises everything that the drone says it tells.
+    ///
+    /// # Errors
+    /// When what it says of itself or of its plan is not understood.
+    pub(crate) fn open(context: &Arc<Context>, about: &Value, picture: &[u8]) -> Result<Self> {
+        let schemas = bridge::schema::topics();
+        let mut json = BTreeMap::new();
+        for row in about["topics"].as_array().into_iter().flatten() {
+            let (Some(topic), Some(form), Some(kind)) =
+                (row["topic"].as_str(), row["form"].as_str(), row["type"].as_str())
+            else {
+                continue;
+            };
+            // What is no text would be ten times as long as text.
+            if !form.starts_with("json") {
+                continue;
+            }
+            let schema = schema_of(&schemas, topic).map(|schema| {
+                Schema::new(format!("sereno.{kind}"), "jsonschema", schema.to_string().into_bytes())
+            });
+            let channel = context
+                .channel_builder(format!("/{topic}"))
+                .message_encoding("json")
+                .schema(schema)
+                .build_raw()?;
+            json.insert(topic.to_owned(), channel);
+        }
+        Ok(Self {
+            json,
+            frame: context.channel_builder("/frames").build(),
+            pose: context.channel_builder("/pose").build(),
+            uncertainty: context.channel_builder("/uncertainty").build(),
+            particles: context.channel_builder("/particles").build(),
+            plan: context.channel_builder("/plan").build(),
+            certainty: context.channel_builder("/certainty").build(),
+            sonar: context.channel_builder("/sonar").build(),
+            route: context.channel_builder("/round").build(),
+            video: context.channel_builder("/video").build(),
+            drawn: plan_of(about, picture)?,
+            round: Value::Null,
+            clock: Clock::default(),
+            place: None,
+            height_m: 0.0,
+        })
+    }
+
+    /// Topics that may have viewers.
+    pub(crate) fn topics(&self) -> Vec<String> {
+        let pictures = ["localization/particles", "navigation/grid", "camera/video"];
+        self.json.keys().cloned().chain(pictures.map(str::to_owned)).collect()
+    }
+
+    /// Whether anybody watches what is made of a topic.
+    pub(crate) fn is_watched(&self, topic: &str) -> bool {
+        let own = self.json.get(topic).is_some_and(|channel| channel.has_sinks());
+        own || match topic {
+            "localization/particles" => self.particles.has_sinks(),
+            "navigation/grid" => self.certainty.has_sinks(),
+            "navigation/patrol" => self.route.has_sinks(),
+            "camera/video" => self.video.has_sinks(),
+            _ => false,
+        }
+    }
+
+    /// Whether pictures are to be asked for.
+    pub(crate) fn shows_video(&self) -> bool {
+        self.video.has_sinks()
+    }
+
+    /// Says again, to whoever has begun to watch these channels, what is not said often.
+    pub(crate) fn show_again(&self, fresh: &[String]) {
+        let now_ns = now_ns();
+        if fresh.iter().any(|topic| topic == "/plan") {
+            self.plan.log_with_time(&scene::plan(&self.drawn, scene::timestamp(now_ns)), now_ns);
+        }
+        if fresh.iter().any(|topic| topic == "/round") && !self.round.is_null() {
+            self.route.log_with_time(&scene::route(&self.round, scene::timestamp(now_ns)), now_ns);
+        }
+    }
+
+    /// A message of the drone; what is none of this version is left out, as on the page.
+    pub(crate) fn take(&mut self, topic: &str, heard: &Heard) {
+        // What did not understand it shows nothing, and the rest goes on.
+        let _ =
+            if heard.is_json { self.text(topic, &heard.payload) } else { self.bytes(topic, &heard.payload) };
+    }
+
+    fn text(&mut self, topic: &str, payload: &[u8]) -> Option<()> {
+        let message: Value = serde_json::from_slice(payload).ok()?;
+        let unix_ns = self.clock.unix_ns(message["header"]["stamp_ns"].as_u64()?, now_ns());
+        if let Some(channel) = self.json.get(topic) {
+            channel.log_with_meta(payload, PartialMetadata::with_log_time(unix_ns));
+        }
+        let at = scene::timestamp(unix_ns);
+        match topic {
+            "localization/pose" => self.show_place(&message, at, unix_ns),
+            "sonar/ranges" => {
+                let (cones, height_m) = scene::sonar(&message, at);
+                self.height_m = height_m.unwrap_or(self.height_m);
+                self.sonar.log_with_time(&cones, unix_ns);
+            }
+            "navigation/patrol" => {
+                self.route.log_with_time(&scene::route(&message, at), unix_ns);
+                self.round = message;
+            }
+            _ => {}
+        }
+        Some(())
+    }
+
+    fn show_place(&mut self, message: &Value, at: Timestamp, unix_ns: u64) {
+        self.place = Place::of(message, self.height_m);
+        let Some(place) = self.place else { return };
+        self.frame.log_with_time(&scene::transform(&place, at), unix_ns);
+        self.pose.log_with_time(&scene::pose_in_frame(&place, at), unix_ns);
+        if let Some(ring) = scene::uncertainty(message, &place, at) {
+            self.uncertainty.log_with_time(&ring, unix_ns);
+        }
+    }
+
+    fn bytes(&mut self, topic: &str, payload: &[u8]) -> Option<()> {
+        let stamp_ns = u64::from_le_bytes(payload.get(..8)?.try_into().ok()?);
+        let unix_ns = self.clock.unix_ns(stamp_ns, now_ns());
+        let at = scene::timestamp(unix_ns);
+        match topic {
+            "localization/particles" => {
+                let set = decode_particles(payload)?;
+                let compass_rad = self.place?.compass_rad;
+                self.particles.log_with_time(&scene::particles(&set, compass_rad, at), unix_ns);
+            }
+            "navigation/grid" => {
+                let grid = message_of::<ipc_types::Grid>(payload, false)?;
+                self.certainty.log_with_time(&scene::certainty(&grid, at), unix_ns);
+            }
+            "camera/video" => {
+                let unit = message_of::<Video>(payload, true)?;
+                self.video.log_with_time(&scene::video(&unit, at)?, unix_ns);
+            }
+            _ => {}
+        }
+        Some(())
+    }
+}
+
+/// A message out of its bytes; with `cut` they may end early.
+fn message_of<T: Message>(bytes: &[u8], cut: bool) -> Option<Box<T>> {
+    let mut message = bytemuck::allocation::zeroed_box::<T>();
+    if !cut && bytes.len() != size_of::<T>() {
+        return None;
+    }
+    bytemuck::bytes_of_mut(&mut *message).get_mut(..bytes.len())?.copy_from_slice(bytes);
+    Some(message)
+}
+
+fn now_ns() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+}
