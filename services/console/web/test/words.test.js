@@ -58,11 +58,25 @@ test("every code of the drone has a word", () => {
   for (const word of codes.PATROL.slice(1)) assert.ok(`round.${word}` in en, word);
 });
 
+test("whatever the pilot says of the sticks and of orders has a Spanish sentence", () => {
+  const folder = new URL("../../../pilot/src/", import.meta.url);
+  const files = readdirSync(folder).filter((name) => name.endsWith(".rs"));
+  const source = files.map((name) => readFileSync(new URL(name, folder), "utf8").split("#[cfg(test)]")[0]).join("");
+  const said = [...source.matchAll(/\b(?:refused|say|Ok)\(\s*"([^"{}]+)"/g)].map((match) => match[1]);
+  assert.ok(said.length > 20, "the pilot says more than that");
+  for (const text of said) assert.notEqual(sentence(text, "es"), text, text);
+  for (const text of said.filter((text) => text.startsWith("refused: "))) {
+    const [, why] = text.split("refused: ");
+    assert.notEqual(sentence(why, "es"), why, text);
+  }
+});
+
 test("sentences of the drone are said in Spanish, parts within parts", () => {
   setLanguage("es");
   assert.equal(sentence("refused: not flying"), "rechazado: no está volando");
   assert.equal(sentence("refused: battery at 3.61 V a cell, 3.70 needed"), "rechazado: batería a 3.61 V por celda; hacen falta 3.70");
   assert.equal(sentence("looking at Kitchen: place 3 of 22: something stands in the way, waiting for it to move on"), "mirando Kitchen: punto 3 de 22; algo corta el paso, se espera a que se aparte");
+  assert.equal(sentence("accepted: pilot the sticks are yours: stopping first; navigation paused"), "aceptado: piloto: los mandos son suyos: primero se detiene; navegación: en pausa");
   assert.equal(sentence("on the ground; something new"), "en el suelo; something new");
   assert.equal(sentence("a sentence nobody foresaw"), "a sentence nobody foresaw");
   assert.equal(sentence(""), "");

@@ -6,6 +6,7 @@ import { freshName, moved, polygon, rectangle, reshaped } from "../pure/building
 import { extent } from "../pure/drafting.js";
 import { hit } from "../pure/hit.js";
 import { Projection } from "../pure/projection.js";
+import { fitCanvas } from "../view/canvas-size.js";
 import { h, iconButton, setData, setText, show } from "../view/dom.js";
 import { drawGround, drawScale } from "../watch/draw-plan.js";
 import { loadGround } from "../watch/ground.js";
@@ -103,16 +104,10 @@ export class EditCanvas {
     return view.ground?.box ?? null;
   }
   resize() {
-    const { clientWidth, clientHeight } = this.element;
-    if (clientWidth === 0 || clientHeight === 0) return;
-    const ratio = Math.min(devicePixelRatio || 1, 2.5);
-    this.canvas.width = Math.round(clientWidth * ratio);
-    this.canvas.height = Math.round(clientHeight * ratio);
-    this.view.ratio = ratio;
-    this.view.em = parseFloat(getComputedStyle(document.documentElement).fontSize) || 16;
-    this.view.projection.resize(clientWidth, clientHeight);
+    if (!fitCanvas(this.view, this.canvas, this.element)) return;
     if (!this.touched) this.fit();
-    this.redraw();
+    // At once: what was cleared would be seen as a flash.
+    this.draw();
   }
   fit() {
     const box = this.box();

@@ -101,7 +101,7 @@ export class Chronicle {
       if (!old) this.report = line.report;
       this.add(when, "report", "ok", "event.report", { ...values, report: line.report });
     } else if (line.kind === "round" && line.text === "started") this.add(when, "round", "lamp", "event.round_started");
-    else this.add(when, "told", line.kind === "link" ? "caution" : "info", "event.told", values);
+    else this.add(when, "told", line.kind !== "link" ? "info" : line.text === "connection found" ? "ok" : "caution", "event.told", values);
   }
   /** A phase or a failsafe from before this page was opened. */
   toldState({ time_ms, kind, text, verb }) {

@@ -15,7 +15,7 @@ function row(line) {
   const kind = line.kind in TONE ? t(`log.kind.${line.kind}`) : line.kind;
   const verb = line.kind === "order" && t(`verb.${line.verb}`) !== `verb.${line.verb}` ? t(`verb.${line.verb}`) : sentence(line.verb ?? "");
   return h("tr", {},
-    h("td", { "data-name": t("log.when") }, moment(line.time_ms)),
+    h("td", { class: "figure", "data-name": t("log.when") }, moment(line.time_ms)),
     h("td", {}, h("span", { class: `pill ${TONE[line.kind] ?? ""}` }, kind)),
     h("td", { class: "who" }, h("strong", {}, line.account || "–"), h("span", {}, [line.role ? t(`role.${line.role}`) : "", line.address].filter(Boolean).join(" · "))),
     h("td", {}, [line.drone, verb].filter(Boolean).join(" · ")),

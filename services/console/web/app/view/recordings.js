@@ -51,9 +51,9 @@ function row(drone, one, administrator, again) {
   const when = nameOf(one);
   return h("tr", {},
     h("td", {}, h("strong", {}, when), one.incident ? h("span", { class: "pill caution" }, t("recordings.incident", { number: one.incident })) : null),
-    h("td", { "data-name": t("recordings.length") }, length === null ? h("span", { class: "pill alarm" }, t("recordings.open")) : `${clock(length)} min`),
-    h("td", { "data-name": t("recordings.picture") }, `${one.width} × ${one.height}`),
-    h("td", { "data-name": t("recordings.size") }, length === null ? "–" : sizeWords(one.bytes)),
+    h("td", { class: "figure", "data-name": t("recordings.length") }, length === null ? h("span", { class: "pill alarm" }, t("recordings.open")) : `${clock(length)} min`),
+    h("td", { class: "figure", "data-name": t("recordings.picture") }, `${one.width} × ${one.height}`),
+    h("td", { class: "figure", "data-name": t("recordings.size") }, length === null ? "–" : sizeWords(one.bytes)),
     h("td", { "data-name": t("recordings.who") }, one.account),
     h("td", { class: "number" }, h("div", { class: "row-actions" },
       button(t("recordings.play"), "play", { "aria-label": `${t("recordings.play")}: ${when}`, onclick: () => play(drone, one) }),

@@ -102,7 +102,7 @@ export class ManualPanel {
     }
     for (const { channel, bar } of this.rows) {
       const input = mapping[channel];
-      const value = Number.isInteger(input.axis) ? (pad.axes[input.axis] ?? 0) * input.sign : pad.buttons[input.button]?.pressed ? 1 : -1;
+      const value = Number.isInteger(input.axis) ? (pad.axes[input.axis] ?? 0) * input.sign : pad.buttons[input.button]?.pressed ? 1 : 0;
       bar.style.setProperty("--value", Math.max(-1, Math.min(1, value)).toFixed(3));
       setData(bar, "on", Number.isInteger(input.button) && value > 0);
     }

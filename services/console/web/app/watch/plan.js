@@ -2,6 +2,7 @@
 
 import { planUrl } from "../net/api.js";
 import { Projection } from "../pure/projection.js";
+import { fitCanvas } from "../view/canvas-size.js";
 import { h, iconButton, setData, show } from "../view/dom.js";
 import { t } from "../words/text.js";
 import { BaseLayer } from "./base-layer.js";
@@ -76,16 +77,10 @@ export class PlanPanel {
     this.dirty = true;
   }
   resize() {
-    const { clientWidth, clientHeight } = this.element;
-    if (clientWidth === 0 || clientHeight === 0) return;
-    const ratio = Math.min(devicePixelRatio || 1, 2.5);
-    this.canvas.width = Math.round(clientWidth * ratio);
-    this.canvas.height = Math.round(clientHeight * ratio);
-    this.view.ratio = ratio;
-    this.view.em = parseFloat(getComputedStyle(document.documentElement).fontSize) || 16;
-    this.view.projection.resize(clientWidth, clientHeight);
+    if (!fitCanvas(this.view, this.canvas, this.element)) return;
     if (!this.touched) this.fit();
-    this.dirty = true;
+    // At once: what was cleared would be seen as a flash.
+    this.draw(this.fresh);
   }
   /** Where the tools lie below and not beside the plan. */
   get narrow() {

@@ -43,6 +43,7 @@ export class VideoPanel {
     this.cover = h("div", { class: "video-cover", role: "status" }, icon("video-off"), this.words);
     this.age = h("span", { class: "chip video-age", hidden: true });
     this.path = h("span", { class: "video-path" });
+    this.foot = h("div", { class: "video-foot" }, this.path);
     this.choice = h("select", { class: "select small-select", "aria-label": t("video.size"), onchange: (event) => {
       this.size = Number(event.target.value);
       this.call();
@@ -54,7 +55,8 @@ export class VideoPanel {
     const full = iconButton(t("video.full"), "full", { onclick: () => this.video.requestFullscreen?.().catch(() => {}) });
     this.element = h("section", { class: "panel video-panel", "aria-label": t("video.name") },
       h("div", { class: "video-stage" }, this.video, this.image, this.cover, this.age),
-      h("div", { class: "video-bar" }, h("div", { class: "segments", role: "group", "aria-label": t("video.mode") }, this.modes), this.choice, this.path, full));
+      h("div", { class: "video-bar" }, h("div", { class: "segments", role: "group", "aria-label": t("video.mode") }, this.modes), this.choice, full),
+      this.foot);
     this.frameAt = null;
     this.delay = 0;
     this.sentAge = 0;

@@ -55,7 +55,7 @@ export function watchView(drone, { account, drones, recording = { keeps: false }
   const alarm = new AlarmPanel(session);
   const video = new VideoPanel(session);
   const record = new RecordBar(session, recording);
-  video.element.append(record.element);
+  video.foot.append(record.element);
   const gauges = new GaugesPanel(session);
   const losses = new LossesPanel(session);
   const round = new RoundPanel(session);

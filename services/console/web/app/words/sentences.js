@@ -13,7 +13,11 @@ const compiled = rules.map(([english, spanish]) => ({
 /** The sentence in `language`. Parts after "; " and ": " are looked up by themselves when the whole is not known. */
 export function sentence(text, language = currentLanguage()) {
   if (language !== "es" || !text) return text;
-  return whole(text) ?? parts(text, "; ") ?? parts(text, ": ") ?? text;
+  return known(text) ?? text;
+}
+
+function known(text) {
+  return whole(text) ?? parts(text, "; ") ?? parts(text, ": ");
 }
 
 function whole(text) {
@@ -22,7 +26,7 @@ function whole(text) {
     if (!match) continue;
     return spanish.replace(/\{(\w+)\}/g, (_, name) => {
       const value = match[1 + names.indexOf(name)] ?? "";
-      return whole(value) ?? value;
+      return known(value) ?? value;
     });
   }
   return null;
