@@ -6,7 +6,7 @@ use crate::order::OrderText;
 use ipc_types::{Field, Message, Particles, TopicVisitor, Verb, visit_topic};
 use serde_json::Value;
 use std::path::Path;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 use zenoh::handlers::FifoChannel;
 use zenoh::{Config, Session, Wait};
@@ -178,17 +178,16 @@ impl Remote {
         self.messages(&self.keys.telemetry(topic))
     }
 
-    /// Messages of a topic into a queue that several topics share, with the topic's name, until what this returns is dropped.
-    /// Those that find the queue full are lost, as on board.
+    /// Messages of a topic as they come, until what this returns is dropped. `hear` is called by zenoh and must not wait.
     ///
     /// # Errors
     /// When zenoh refuses.
-    pub fn follow_into(&self, topic: &str, to: SyncSender<(String, Heard)>) -> Result<Following, String> {
-        let name = topic.to_owned();
-        let pass = move |heard| {
-            let _ = to.try_send((name.clone(), heard));
-        };
-        Ok(Following { _subscriber: self.subscribe(&self.keys.telemetry(topic), pass)? })
+    pub fn follow_with(
+        &self,
+        topic: &str,
+        hear: impl Fn(Heard) + Send + Sync + 'static,
+    ) -> Result<Following, String> {
+        Ok(Following { _subscriber: self.subscribe(&self.keys.telemetry(topic), hear)? })
     }
 
     fn messages(&self, key: &str) -> Result<Followed, String> {

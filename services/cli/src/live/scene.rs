@@ -15,6 +15,8 @@ pub(crate) const PLAN: &str = "plan";
 pub(crate) const DRONE: &str = "drone";
 /// Particles that are shown at most.
 const MOST_PARTICLES: usize = 1000;
+/// Corners of a round that are shown at most.
+const MOST_WAYPOINTS: usize = 1024;
 /// Half of a sonar's cone (DESIGN 6: about 30 degrees).
 const HALF_CONE: f64 = TAU / 24.0;
 /// An echo is shown until its sensor has had its turn thrice.
@@ -41,14 +43,18 @@ pub(crate) struct Place {
 
 impl Place {
     /// From `localization/pose`; `None` while it is no place on the plan. `z_m` is what the down sonar says.
-    pub(crate) fn of(pose: &Value, z_m: f64) -> Option<Self> {
+    ///
+    /// # Errors
+    /// Which field is none.
+    pub(crate) fn of(pose: &Value, z_m: f64) -> Result<Option<Self>, &'static str> {
         let number = |key: &str| pose[key].as_f64().filter(|number| number.is_finite());
-        if pose["searching"].as_u64() != Some(0) {
-            return None;
+        if pose["searching"].as_u64().ok_or("searching is no whole number")? != 0 {
+            return Ok(None);
         }
-        let heading_rad = number("heading_rad")?;
+        let heading_rad = number("heading_rad").ok_or("heading_rad is no number")?;
         let compass_rad = heading_rad - number("heading_offset_rad").unwrap_or(0.0);
-        Some(Self { x_m: number("x_m")?, y_m: number("y_m")?, z_m, heading_rad, compass_rad })
+        let (x_m, y_m) = (number("x_m").ok_or("x_m is no number")?, number("y_m").ok_or("y_m is no number")?);
+        Ok(Some(Self { x_m, y_m, z_m, heading_rad, compass_rad }))
     }
 
     fn pose(&self) -> Pose {
@@ -92,9 +98,19 @@ fn line(kind: line_primitive::Type, points: Vec<Point3>, color: Color, thickness
     LinePrimitive { r#type: kind.into(), points, color: Some(color), thickness, ..LinePrimitive::default() }
 }
 
-/// The ellipse in which the drone is 19 times out of 20 (two standard deviations), by the covariance of `localization/pose`.
-pub(crate) fn uncertainty(message: &Value, place: &Place, at: Timestamp) -> Option<SceneUpdate> {
-    let number = |key: &str| message[key].as_f64().filter(|number| number.is_finite());
+/// Two standard deviations each way, by the covariance of `localization/pose`: of a normal distribution, 86 of 100 are in this
+/// ellipse.
+///
+/// # Errors
+/// When the covariance is none.
+pub(crate) fn uncertainty(
+    message: &Value,
+    place: &Place,
+    at: Timestamp,
+) -> Result<SceneUpdate, &'static str> {
+    let number = |key: &str| {
+        message[key].as_f64().filter(|number| number.is_finite()).ok_or("the covariance is no number")
+    };
     let (xx, xy, yy) = (number("variance_x_m2")?, number("covariance_xy_m2")?, number("variance_y_m2")?);
     let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
     let root = half.hypot(xy);
@@ -107,7 +123,7 @@ pub(crate) fn uncertainty(message: &Value, place: &Place, at: Timestamp) -> Opti
     });
     let ring = line(line_primitive::Type::LineLoop, points.collect(), LAMP, 0.02);
     let ring = SceneEntity { lines: vec![ring], ..entity("uncertainty", PLAN, at) };
-    Some(SceneUpdate { deletions: Vec::new(), entities: vec![ring] })
+    Ok(SceneUpdate { deletions: Vec::new(), entities: vec![ring] })
 }
 
 /// A thousand of the particles at most, each as often as its weight deserves.
@@ -175,11 +191,16 @@ pub(crate) fn certainty(message: &ipc_types::Grid, at: Timestamp) -> Grid {
 }
 
 /// The echoes of one group, as cones in the drone's frame; and the height over the ground, if one looked down.
-pub(crate) fn sonar(message: &Value, at: Timestamp) -> (SceneUpdate, Option<f64>) {
-    let count = message["count"].as_u64().and_then(|count| usize::try_from(count).ok()).unwrap_or(0);
+///
+/// # Errors
+/// Which field is none.
+pub(crate) fn sonar(message: &Value, at: Timestamp) -> Result<(SceneUpdate, Option<f64>), &'static str> {
+    let readings = message["readings"].as_array().ok_or("readings is no list")?;
+    let count = message["count"].as_u64().ok_or("count is no whole number")?;
+    let count = usize::try_from(count).unwrap_or(usize::MAX);
     let mut height_m = None;
     let mut entities = Vec::new();
-    for reading in message["readings"].as_array().into_iter().flatten().take(count) {
+    for reading in readings.iter().take(count) {
         let number = |key: &str| reading[key].as_f64().filter(|number| number.is_finite());
         let ok = reading["status"].as_u64() == Some(SonarStatus::Ok.code().into());
         let values = (number("range_m"), number("bearing_rad"), number("elevation_rad"));
@@ -198,7 +219,7 @@ pub(crate) fn sonar(message: &Value, at: Timestamp) -> (SceneUpdate, Option<f64>
         };
         entities.push(cone);
     }
-    (SceneUpdate { deletions: Vec::new(), entities }, height_m)
+    Ok((SceneUpdate { deletions: Vec::new(), entities }, height_m))
 }
 
 /// A flat cone: across the axis in the plane that turns about the body's up.
@@ -220,11 +241,15 @@ fn fan(from: &Point3, bearing: f64, elevation: f64, range: f64) -> TriangleListP
 }
 
 /// The round of `navigation/patrol`: what has been flown, faint, and what is still to be.
-pub(crate) fn route(message: &Value, at: Timestamp) -> SceneUpdate {
+///
+/// # Errors
+/// Which field is none.
+pub(crate) fn route(message: &Value, at: Timestamp) -> Result<SceneUpdate, &'static str> {
     let points: Vec<Point3> = message["waypoints"]
         .as_array()
-        .into_iter()
-        .flatten()
+        .ok_or("waypoints is no list")?
+        .iter()
+        .take(MOST_WAYPOINTS)
         .filter_map(|point| Some(Point3 { x: point["x_m"].as_f64()?, y: point["y_m"].as_f64()?, z: 0.05 }))
         .collect();
     let next = message["next"].as_u64().and_then(|next| usize::try_from(next).ok()).unwrap_or(0);
@@ -234,12 +259,17 @@ pub(crate) fn route(message: &Value, at: Timestamp) -> SceneUpdate {
     let lines = [(flown, FLOWN), (ahead, ROUTE)];
     let lines = lines.into_iter().filter(|(points, _)| points.len() > 1);
     let lines = lines.map(|(points, color)| strip(points, color)).collect();
-    SceneUpdate { deletions: Vec::new(), entities: vec![SceneEntity { lines, ..entity("round", PLAN, at) }] }
+    let round = SceneEntity { lines, ..entity("round", PLAN, at) };
+    Ok(SceneUpdate { deletions: Vec::new(), entities: vec![round] })
 }
 
-/// One access unit.
-pub(crate) fn video(message: &Video, at: Timestamp) -> Option<CompressedVideo> {
-    let data = message.bytes.as_slice().get(..message.length as usize)?.to_vec();
+/// One access unit, of a message of which `heard` bytes came; `None` if they end before it does.
+pub(crate) fn video(message: &Video, heard: usize, at: Timestamp) -> Option<CompressedVideo> {
+    let length = message.length as usize;
+    if heard < std::mem::offset_of!(Video, bytes).checked_add(length)? {
+        return None;
+    }
+    let data = message.bytes.as_slice().get(..length)?.to_vec();
     Some(CompressedVideo {
         timestamp: Some(at),
         frame_id: DRONE.to_owned(),

@@ -10,7 +10,7 @@ fn near(a: f64, b: f64) -> bool {
 }
 
 fn cones(readings: &Value) -> (Vec<SceneEntity>, Option<f64>) {
-    let (update, height_m) = sonar(&json!({ "count": 2, "readings": readings }), at());
+    let (update, height_m) = sonar(&json!({ "count": 2, "readings": readings }), at()).expect("ranges");
     (update.entities, height_m)
 }
 
@@ -28,15 +28,16 @@ fn a_time_is_seconds_and_nanoseconds() {
 fn a_place_that_is_none_is_not_shown() {
     let mut pose =
         json!({ "x_m": 1.0, "y_m": 2.0, "heading_rad": 0.5, "heading_offset_rad": 0.2, "searching": 0 });
-    let place = Place::of(&pose, 0.8).expect("a place");
+    let place = Place::of(&pose, 0.8).expect("a pose").expect("a place");
     assert!(near(place.compass_rad, 0.3) && near(place.z_m, 0.8));
     let shown = pose_in_frame(&place, at()).pose.expect("a pose");
     let turn = shown.orientation.expect("a turn");
     assert!(near(2.0 * turn.z.atan2(turn.w), 0.5));
     pose["searching"] = json!(1);
-    assert_eq!(Place::of(&pose, 0.8), None, "in a frame of its own");
-    assert_eq!(Place::of(&json!({ "searching": 0, "x_m": null, "y_m": 1.0 }), 0.8), None);
-    assert_eq!(Place::of(&json!("junk"), 0.8), None);
+    assert_eq!(Place::of(&pose, 0.8), Ok(None), "in a frame of its own");
+    let nowhere = json!({ "searching": 0, "x_m": null, "y_m": 1.0, "heading_rad": 0.0 });
+    assert_eq!(Place::of(&nowhere, 0.8), Err("x_m is no number"));
+    assert_eq!(Place::of(&json!("junk"), 0.8), Err("searching is no whole number"));
 }
 
 #[test]
@@ -50,7 +51,7 @@ fn an_ellipse_lies_along_what_is_least_known() {
     let across = |point: &Point3| ((point.x - 3.0) - (point.y - 4.0)).abs() / 2f64.sqrt();
     let most = |of: &dyn Fn(&Point3) -> f64| points.iter().map(of).fold(0.0, f64::max);
     assert!(near(most(&along), 1.0) && near(most(&across), 0.2), "{} {}", most(&along), most(&across));
-    assert!(uncertainty(&json!({ "variance_x_m2": null }), &place, at()).is_none());
+    assert!(uncertainty(&json!({ "variance_x_m2": null }), &place, at()).is_err());
 }
 
 #[test]
@@ -95,18 +96,26 @@ fn a_cone_lies_where_its_sensor_looks() {
     let fault = SonarStatus::Fault.code();
     let (shown, height_m) = cones(&json!([reading(0, fault, 0.0, 0.0), { "status": ok, "range_m": null }]));
     assert!(shown.is_empty() && height_m.is_none());
+    for (junk, reason) in [
+        (json!({ "count": 1 }), "readings is no list"),
+        (json!({ "count": -1, "readings": [] }), "count is no whole number"),
+        (json!([]), "readings is no list"),
+    ] {
+        assert_eq!(sonar(&junk, at()).err(), Some(reason), "{junk}");
+    }
+    let (shown, _) = sonar(&json!({ "count": u64::MAX, "readings": [1, null, {}] }), at()).expect("ranges");
+    assert!(shown.entities.is_empty(), "no reading among these");
 }
 
 #[test]
 fn a_round_is_what_was_flown_and_what_is_ahead() {
     let message = json!({ "next": 1, "waypoints": [{ "x_m": 0.0, "y_m": 0.0 }, { "x_m": 1.0, "y_m": 0.0 }, { "x_m": 1.0, "y_m": 2.0 }] });
-    let lines = route(&message, at()).entities.remove(0).lines;
+    let lines = route(&message, at()).expect("a round").entities.remove(0).lines;
     assert_eq!(lines.iter().map(|line| line.points.len()).collect::<Vec<_>>(), [2, 2]);
     assert!(near(lines[1].points[1].y, 2.0));
-    assert!(
-        route(&json!({ "waypoints": [] }), at()).entities[0].lines.is_empty(),
-        "and an old one goes away"
-    );
+    let none = route(&json!({ "waypoints": [] }), at()).expect("a round");
+    assert!(none.entities[0].lines.is_empty(), "and an old one goes away");
+    assert_eq!(route(&json!({ "waypoints": 7 }), at()).err(), Some("waypoints is no list"));
 }
 
 #[test]
@@ -114,4 +123,16 @@ fn a_plan_stands_on_its_lower_left_corner() {
     let drawn = Plan::from_ascii(&["##?", "#.."], 0.5);
     let shown = plan(&drawn, at());
     assert_eq!((shown.column_count, shown.data.as_ref()), (3, &[255, 0, 0, 255, 255, 128][..]));
+}
+
+#[test]
+fn a_picture_that_ends_early_is_none() {
+    let mut unit = bytemuck::allocation::zeroed_box::<Video>();
+    unit.length = 3;
+    unit.bytes.as_mut_slice()[..3].copy_from_slice(&[0, 0, 1]);
+    let whole = std::mem::offset_of!(Video, bytes) + 3;
+    assert_eq!(video(&unit, whole, at()).map(|shown| shown.data.to_vec()), Some(vec![0, 0, 1]));
+    assert!(video(&unit, whole - 1, at()).is_none());
+    unit.length = u32::MAX;
+    assert!(video(&unit, whole, at()).is_none());
 }
