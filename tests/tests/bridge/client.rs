@@ -80,8 +80,13 @@ impl Client {
 
     /// Gives a good order.
     pub(crate) fn give(&mut self, verb: Verb) -> Option<Value> {
-        let order = self.order(verb).to_string().into_bytes();
-        self.give_as(&self.name, verb, order, Duration::from_secs(14))
+        let order = self.order(verb);
+        self.give_order(verb, &order)
+    }
+
+    /// Gives an order that was made before.
+    pub(crate) fn give_order(&self, verb: Verb, order: &Value) -> Option<Value> {
+        self.give_as(&self.name, verb, order.to_string().into_bytes(), Duration::from_secs(14))
     }
 
     pub(crate) fn ask(&self, key: &str, payload: Option<Vec<u8>>, patience: Duration) -> Option<Vec<u8>> {

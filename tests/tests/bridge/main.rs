@@ -3,11 +3,14 @@
 
 mod building;
 mod client;
+mod race;
+mod refused;
 mod system;
 
 use bridge::keys::{Direction, verb_word};
 use client::{ANSWER, Client, SILENCE};
 use ipc_types::{Channels, Command, PilotState, Sticks, Verb};
+use race::sticks;
 use runtime::{Input, Tool};
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -67,12 +70,6 @@ fn connect(system: &System, name: &str) -> Client {
     let client = Client::open(&system.authority.client_config(name), |_| {}).unwrap();
     client.wait_beacon();
     client
-}
-
-fn sticks(client: &Client, lease: u64, sequence: u64) -> Value {
-    json!({ "lease": lease, "socket": 7, "input_sequence": sequence, "beacon_ns": client.beacon(), "since_ms": 0.0,
-        "forward": 0.0, "left": 0.0, "up": 0.0, "turn": 0.0, "held": false, "height_hold": true, "heading_hold": true,
-        "arm": "absent" })
 }
 
 /// Takes off, repeating the order while the pilot is not yet ready.
@@ -146,10 +143,10 @@ fn guards_order_viewers_see_and_nobody_speaks_for_another() {
     let system = System::start(Way::Direct, &endpoint);
     system.wait_bridge(&endpoint);
     roles_hold(&system);
-    strangers_get_nothing(&system);
-    bad_input_changes_nothing(&system);
+    refused::strangers_get_nothing(&system);
+    refused::bad_input_changes_nothing(&system);
     the_command_line_does_the_same(&system);
-    sticks_need_the_lease_and_are_quick(&system);
+    race::sticks_need_the_lease_and_are_quick(&system);
     a_flood_loses_no_frame(&system);
     lists_and_papers_are_read_again(&system);
 }
@@ -163,6 +160,15 @@ fn an_installer_changes_the_building_and_nobody_else() {
     building::a_round_is_taken_over(&system);
     building::a_plan_is_taken_over(&system);
     building::not_in_the_air(&system);
+}
+
+#[test]
+fn two_guards_who_ask_at_once_are_never_holders_both() {
+    let endpoint = free_endpoint();
+    // Each of them gives up to two orders a race.
+    let system = System::start_with(Way::Direct, &endpoint, "orders_hz = 100.0\n");
+    system.wait_bridge(&endpoint);
+    race::two_guards_never_hold_the_sticks_both(&system);
 }
 
 #[test]
@@ -183,147 +189,6 @@ fn a_router_between_changes_nothing() {
             .hears("sereno/sereno-1/telemetry/localization/pose", Duration::from_secs(20))
     );
     drop(router);
-}
-
-/// Somebody without a certificate, with one of another authority, or one that is on no list.
-fn strangers_get_nothing(system: &System) {
-    let own = system.authority.client_config("guard");
-    let elsewhere = tempfile::tempdir().unwrap();
-    let other = bridge::Authority::at(elsewhere.path().join("certs"));
-    let text = std::fs::read_to_string(&own).unwrap();
-    let endpoint = bridge::zenoh_config::endpoints_of(&text).unwrap();
-    other.init(&["sereno-1".into()], &[], &endpoint, now_s()).unwrap();
-    other
-        .client("guard", bridge::roles::Standing::Client(bridge::roles::Role::Guard), &endpoint, now_s())
-        .unwrap();
-    // It trusts the drone as the true guard does: the drone is who refuses.
-    let encoded = {
-        use base64::Engine;
-        let pem = std::fs::read(system.authority.directory().join("ca.pem")).unwrap();
-        base64::engine::general_purpose::STANDARD.encode(pem)
-    };
-    let tls = |config: &mut zenoh::Config, key: &str, value: Value| {
-        config.insert_json5(&format!("transport/link/tls/{key}"), &value.to_string()).unwrap();
-    };
-    let strangers: [(&str, zenoh::Result<Client>); 4] = [
-        ("no certificate", Client::open(&own, |config| tls(config, "enable_mtls", json!(false)))),
-        (
-            "another authority",
-            Client::open(&other.client_config("guard"), |config| {
-                tls(config, "root_ca_certificate_base64", json!(encoded));
-            }),
-        ),
-        (
-            "no TLS",
-            Client::open(&own, |config| {
-                config.insert_json5("transport/link/protocols", "[\"tcp\"]").unwrap();
-                let plain = vec![endpoint[0].replace("tls/", "tcp/")];
-                config.insert_json5("connect/endpoints", &json!(plain).to_string()).unwrap();
-            }),
-        ),
-        ("on no list", Client::open(&system.authority.client_config("revoked"), |_| {})),
-    ];
-    let guard = connect(system, "guard");
-    let mut board = Board::join(system);
-    for (what, stranger) in strangers {
-        let Ok(mut stranger) = stranger else { continue };
-        for key in [
-            stranger.keys.beacon(),
-            stranger.keys.telemetry("localization/pose"),
-            stranger.keys.telemetry("**"),
-            "sereno/**".to_owned(),
-            "**".to_owned(),
-        ] {
-            assert!(!stranger.hears(&key, SILENCE), "{what} hears {key}");
-        }
-        for key in [
-            stranger.keys.about(),
-            stranger.keys.plan(),
-            stranger.keys.telemetry("pilot/state"),
-            "sereno/**".to_owned(),
-        ] {
-            assert_eq!(stranger.ask(&key, None, SILENCE), None, "{what} asks {key}");
-        }
-        assert!(!stranger.sees_alive(SILENCE), "{what}");
-        for verb in Verb::ALL.iter().copied() {
-            for name in ["revoked", "guard"] {
-                let order = {
-                    let mut order = stranger.order(verb);
-                    order["beacon_ns"] = json!(guard.beacon());
-                    order.to_string().into_bytes()
-                };
-                let patience = Duration::from_millis(200);
-                assert_eq!(stranger.give_as(name, verb, order, patience), None, "{what}: {verb} as {name}");
-            }
-        }
-        stranger.put(&stranger.keys.sticks("guard"), sticks(&guard, 1, 1).to_string());
-        assert_eq!(board.heard(), Vec::<String>::new(), "{what}");
-    }
-}
-
-/// Replayed, stale, oversized, junk: refused in a sentence or not heard at all, and the bridge lives on.
-fn bad_input_changes_nothing(system: &System) {
-    let mut guard = connect(system, "guard");
-    let before = system.ps("bridge");
-    accepted(&mut guard, Verb::AutomaticOn);
-    let replayed = guard.order(Verb::AutomaticOn).to_string().into_bytes();
-    assert!(guard.give_as("guard", Verb::AutomaticOn, replayed.clone(), ANSWER).is_some());
-    let mut board = Board::join(system);
-    for verb in Verb::ALL.iter().copied() {
-        // At the pace that the drone allows: seven in a row, ten a second.
-        std::thread::sleep(Duration::from_millis(800));
-        let stale = json!({ "beacon_ns": guard.beacon().saturating_sub(2_500_000_000) });
-        let future = json!({ "beacon_ns": guard.beacon() + 10_000_000_000 });
-        let changed = |with: &Value, guard: &mut Client| {
-            let mut order = guard.order(verb);
-            for (key, value) in with.as_object().unwrap() {
-                order[key] = value.clone();
-            }
-            order.to_string().into_bytes()
-        };
-        let bad = [
-            ("stale", changed(&stale, &mut guard)),
-            ("from the future", changed(&future, &mut guard)),
-            ("unknown field", changed(&json!({ "sudo": true }), &mut guard)),
-            ("bad id", changed(&json!({ "id": "7" }), &mut guard)),
-            ("king", changed(&json!({ "role": "king" }), &mut guard)),
-            ("junk", b"\xff\xfe{{{".to_vec()),
-            ("nothing", Vec::new()),
-        ];
-        for (what, payload) in bad {
-            let answer = guard.give_as("guard", verb, payload, ANSWER);
-            let answer = answer.unwrap_or_else(|| panic!("{verb}, {what}: no answer"));
-            let text = answer["text"].as_str().unwrap();
-            assert!(answer["accepted"] == false && !text.is_empty(), "{verb}, {what}: {answer}");
-            assert!(
-                !text.contains("not so fast"),
-                "{verb}, {what}: refused for its pace, not for what it is"
-            );
-        }
-    }
-    std::thread::sleep(Duration::from_millis(600));
-    if let Some(answer) = guard.give_as("guard", Verb::AutomaticOn, replayed, ANSWER) {
-        assert_eq!(answer["accepted"], false, "{answer}");
-    }
-    for size in [5_000, 100_000, 8_000_000] {
-        let large = vec![b'x'; size];
-        assert_eq!(guard.give_as("guard", Verb::Land, large.clone(), SILENCE), None, "{size} bytes");
-        guard.put(&guard.keys.sticks("guard"), large.clone());
-        guard.put(&guard.keys.signal("guard", "s", Direction::In), large);
-    }
-    for junk in [&b""[..], b"{}", b"\xff\xff", b"[[[[[[[[[["] {
-        guard.put(&guard.keys.sticks("guard"), junk.to_vec());
-        guard.put(&guard.keys.signal("guard", "s", Direction::In), junk.to_vec());
-    }
-    assert_eq!(board.heard(), Vec::<String>::new());
-    let mut guard = connect(system, "guard");
-    accepted(&mut guard, Verb::AutomaticOn);
-    let after = system.ps("bridge");
-    assert_eq!(
-        (&before["pid"], &before["restarts"]),
-        (&after["pid"], &after["restarts"]),
-        "the bridge lives on"
-    );
 }
 
 /// `sereno --remote` prints what `sereno` prints on board.
@@ -358,56 +223,6 @@ fn the_command_line_does_the_same(system: &System) {
     );
     let local = system.remote("guard", &["ps"]);
     assert!(text(&local.stderr).contains("is for the machine of the drone"), "{}", text(&local.stderr));
-}
-
-/// Only the certificate that took the lease steers, and its inputs are on board at once.
-fn sticks_need_the_lease_and_are_quick(system: &System) {
-    let (mut guard, other) = (connect(system, "guard"), connect(system, "other"));
-    let mut board = Board::join(system);
-    accepted(&mut guard, Verb::SticksTake);
-    let mut state = None;
-    wait_until("a lease", || {
-        board.tool.tick();
-        state = board.pilot().or(state);
-        state.is_some_and(|state| state.lease != 0)
-    });
-    let lease = state.unwrap().lease;
-    board.forget();
-    other.put(&other.keys.sticks("other"), sticks(&other, lease, 1).to_string());
-    guard.put(&guard.keys.sticks("guard"), sticks(&guard, lease + 1, 1).to_string());
-    let mut wrong_socket = sticks(&guard, lease, 1);
-    wrong_socket["socket"] = json!(8);
-    guard.put(&guard.keys.sticks("guard"), wrong_socket.to_string());
-    std::thread::sleep(SILENCE);
-    assert_eq!(board.heard(), Vec::<String>::new(), "forged");
-    let mut took = Vec::new();
-    for sequence in 2..202 {
-        let before = runtime::monotonic_ns();
-        guard.put(&guard.keys.sticks("guard"), sticks(&guard, lease, sequence).to_string());
-        let deadline = Instant::now() + ANSWER;
-        loop {
-            if let Some(heard) = board.sticks.receive()
-                && heard.input_sequence == sequence
-            {
-                took.push((runtime::monotonic_ns() - before) as f64 * 1e-6);
-                assert!((0.0..200.0).contains(&heard.age_ms), "{} ms old", heard.age_ms);
-                break;
-            }
-            assert!(Instant::now() < deadline, "input {sequence} has not come");
-            std::hint::spin_loop();
-        }
-        std::thread::sleep(Duration::from_millis(13));
-    }
-    took.sort_by(f64::total_cmp);
-    let (p50, p99) = (took[took.len() / 2], took[took.len() * 99 / 100]);
-    println!("sticks, zenoh client to operator/sticks: p50 {p50:.2} ms, p99 {p99:.2} ms of {}", took.len());
-    let release = {
-        let mut order = guard.order(Verb::SticksRelease);
-        (order["lease"], order["socket"]) = (json!(lease), json!(7));
-        order.to_string().into_bytes()
-    };
-    let answer = guard.give_as("guard", Verb::SticksRelease, release, ANSWER).unwrap();
-    assert_eq!(answer["accepted"], true, "{answer}");
 }
 
 /// Frames of the channels that were heard until it was over, and those between them that were not.

@@ -58,6 +58,11 @@ impl System {
     /// Starts a system whose bridge is on the network, or on its way to a router at `endpoint`. Clients: a `guard`, a
     /// `viewer`, an `installer`, another guard (`other`), and one whose certificate is on no list (`revoked`).
     pub(crate) fn start(way: Way, endpoint: &str) -> Self {
+        Self::start_with(way, endpoint, "")
+    }
+
+    /// As [`Self::start`], with more lines in the bridge's configuration.
+    pub(crate) fn start_with(way: Way, endpoint: &str, more: &str) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let directory = tempfile::tempdir().unwrap();
         let deploy = lightly_cluttered(directory.path(), "two-rooms").unwrap();
@@ -78,8 +83,8 @@ impl System {
             authority.client("hub", Standing::Router, &endpoints, now_s()).unwrap();
         }
         let config = match way {
-            Way::Direct => format!("listen = [\"{endpoint}\"]\n"),
-            Way::Router => format!("listen = []\nconnect = [\"{endpoint}\"]\n"),
+            Way::Direct => format!("listen = [\"{endpoint}\"]\n{more}"),
+            Way::Router => format!("listen = []\nconnect = [\"{endpoint}\"]\n{more}"),
         };
         std::fs::write(deploy.join("config/bridge.toml"), config).unwrap();
         let up = sereno(&deploy, &directory.path().join("run"), &["up", "--sim", "--quiet", "--seed", "2"])

@@ -3,132 +3,26 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, reason = "tests")]
 
 mod browser;
+mod hand;
 mod recording;
 mod rig;
 
 use browser::Guard;
-use ipc_types::{Phase, PilotState, SticksState, Truth};
+use hand::{Witness, claim, fly_by_hand, start_round};
+use ipc_types::{Phase, SticksState};
 use rig::{LONG, Rig, wait_until};
-use runtime::{Input, Tool};
 use std::time::{Duration, Instant};
 
-const PASSWORD: &str = "a lamp and a bunch of keys";
-
-/// What the drone says of itself, and the truth.
-struct Witness {
-    tool: Tool,
-    state: Input<PilotState>,
-    truth: Input<Truth>,
-    pilot: PilotState,
-    at: Truth,
-}
-
-impl Witness {
-    fn open(rig: &Rig) -> Self {
-        let (manifest, run_dir) = rig.manifest();
-        let mut tool = Tool::join("cli", manifest, &run_dir).unwrap();
-        let (state, truth) = (tool.ports.input().unwrap(), tool.ports.input().unwrap());
-        Self { tool, state, truth, pilot: PilotState::default(), at: Truth::default() }
-    }
-
-    fn look(&mut self) -> (Option<Phase>, Option<SticksState>) {
-        self.tool.tick();
-        while let Some(state) = self.state.receive() {
-            self.pilot = *state;
-        }
-        while let Some(truth) = self.truth.receive() {
-            self.at = *truth;
-        }
-        (Phase::from_code(self.pilot.phase), SticksState::from_code(self.pilot.sticks))
-    }
-
-    fn look_yaw(&mut self) -> f32 {
-        wait_until("the truth is told", || {
-            self.look();
-            self.at.header.sequence > 0
-        });
-        self.at.yaw_rad
-    }
-
-    fn wait_phase(&mut self, phase: Phase) {
-        wait_until(&format!("the pilot is in phase {phase}"), || self.look().0 == Some(phase));
-    }
-
-    fn wait_sticks(&mut self, sticks: SticksState) {
-        wait_until(&format!("the sticks are {sticks}"), || self.look().1 == Some(sticks));
-    }
-
-    fn speed(&self) -> f32 {
-        self.at.velocity_x_m_s.hypot(self.at.velocity_y_m_s)
-    }
-}
-
-/// Takes the sticks and holds the button, as a patient human does: on a loaded machine the page may be silent for a moment, and
-/// then the drone wants the sticks let go once more, or taken again. Until `holds` is true while the drone follows.
-async fn fly_by_hand(
-    guard: &Guard,
-    drone: &mut Witness,
-    axes: &str,
-    mut holds: impl FnMut(&Witness) -> bool,
-) {
-    let began = Instant::now();
-    loop {
-        let (_, sticks) = drone.look();
-        match sticks {
-            Some(SticksState::Free) => {
-                guard.look("(sereno.hold = false, sereno.axes = [0, 0, 0, 0])").await;
-                let take = "document.querySelector('.sticks-take')";
-                guard.look(&format!("!{take}.disabled && {take}.click()")).await;
-            }
-            Some(SticksState::Following) => {
-                guard.look(&format!("sereno.axes = {axes}")).await;
-                if holds(drone) {
-                    return;
-                }
-            }
-            _ => {
-                guard.look("(sereno.hold = true, sereno.axes = [0, 0, 0, 0])").await;
-            }
-        }
-        assert!(began.elapsed() < LONG, "by hand: the sticks are {sticks:?}");
-        tokio::time::sleep(Duration::from_millis(30)).await;
-    }
-}
-
-/// Starts the round by the page's one button for it, again while the controller has not got through its boot (5 s, FACTS 1).
-async fn start_round(guard: &Guard, drone: &mut Witness) {
-    let began = Instant::now();
-    loop {
-        match drone.look().0 {
-            Some(Phase::Autonomous) => return,
-            Some(Phase::Grounded) => {
-                let button = "document.querySelector('.dock-primary')";
-                guard
-                    .look(&format!(
-                        "!{button}.disabled && {button}.innerText.includes('Start round') && {button}.click()"
-                    ))
-                    .await;
-                tokio::time::sleep(Duration::from_secs(1)).await;
-            }
-            _ => {}
-        }
-        assert!(
-            began.elapsed() < LONG,
-            "the round does not start: {}",
-            guard.look("document.body.innerText").await
-        );
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
-}
-
-async fn claim(guard: &Guard, rig: &Rig) {
-    guard.fill("code", &rig.claim).await;
-    guard.fill("name", "Ana").await;
-    guard.fill("surname", "Sereno").await;
-    guard.fill("email", "ana@example.org").await;
-    guard.fill("password", PASSWORD).await;
-    guard.picture("claim").await;
-    guard.press("form button[type=submit]").await;
+/// Pictures of the drone's camera come out of the browser's decoder, one after another.
+async fn video_decodes(guard: &Guard) {
+    let video = "document.querySelector('.video-stage video')";
+    let frames = format!("{video}.getVideoPlaybackQuality().totalVideoFrames");
+    let seen = format!("!{video}.hidden && {video}.videoWidth > 0 && {frames} > 0");
+    guard.until("a picture is decoded", &seen, LONG).await;
+    let first = guard.look(&frames).await.as_u64().unwrap();
+    // Two seconds of the slowest pace that the page asks for.
+    let grows = format!("{frames} >= {first} + 30 && {video}.currentTime > 0");
+    guard.until("picture after picture is decoded", &grows, LONG).await;
 }
 
 /// The whole story of the issue: claim, watch, start a round, take over, fly, release, land, read the report.
@@ -138,6 +32,7 @@ async fn a_guard_claims_watches_orders_takes_over_and_reads_the_report() {
     let mut drone = Witness::open(&rig);
     let guard = Guard::open(&rig.address).await;
     claim(&guard, &rig).await;
+    video_decodes(&guard).await;
     start_round(&guard, &mut drone).await;
     guard.until("the page says that it flies", "document.body.innerText.includes('Flying')", LONG).await;
     guard.picture("round-desk").await;

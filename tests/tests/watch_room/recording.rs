@@ -7,7 +7,7 @@ use crate::rig::{LONG, Rig};
 async fn a_guard_records_and_plays_what_was_seen_to_its_end() {
     let rig = Rig::start();
     let guard = Guard::open(&rig.address).await;
-    crate::claim(&guard, &rig).await;
+    crate::hand::claim(&guard, &rig).await;
     guard.press(".record-button").await;
     let bar = "document.querySelector('.record-bar')";
     guard.until("the page says that it records", &format!("{bar}.dataset.on === 'true'"), LONG).await;
