@@ -268,6 +268,19 @@ test("the event log tells what changed, not what was", () => {
   assert.equal(chronicle.entries.length, 300);
 });
 
+test("what was before is told as the console tells it: a failsafe has an end, and one that flickers is one line", () => {
+  const chronicle = new Chronicle(10_000);
+  const told = (time_ms, text, verb) => chronicle.told({ time_ms, kind: "failsafe", text, verb }, time_ms);
+  told(100, "operator silent", "hover");
+  told(300, "none", "none");
+  told(600, "operator silent", "hover");
+  told(700, "none", "none");
+  told(800, "a side sonar is silent", "none");
+  told(900, "none", "none");
+  told(9000, "operator silent", "hover");
+  assert.deepEqual(chronicle.entries.map((entry) => [entry.at, entry.key]), [[9000, "event.failsafe"], [700, "event.failsafe_over"], [100, "event.failsafe"]]);
+});
+
 test("a failsafe that flickers is one line; one that comes again later is another", () => {
   const chronicle = new Chronicle();
   chronicle.look(pilot(), null, null, 0);

@@ -20,6 +20,10 @@ export class Chronicle {
     this.over = null;
     this.began = began;
     this.told_before = new Set();
+    /** Of what the console told: whether the failsafe that holds is none to a guard, which one it is, and which was over last. */
+    this.quiet = false;
+    this.toldNow = "";
+    this.toldOver = null;
   }
   /** Newest first, also when the console tells of what was before. */
   add(at, kind, tone, key, values = {}) {
@@ -106,17 +110,26 @@ export class Chronicle {
   /** A phase or a failsafe from before this page was opened. */
   toldState({ time_ms, kind, text, verb }) {
     if (kind === "failsafe") {
-      // What does nothing and what a guard ordered is no failsafe to a guard, and its end says nothing either.
-      const quiet = verb === "none" || text === "operator";
-      const ended = text === "none";
-      const silent = quiet || (ended && this.quiet);
-      this.quiet = quiet;
-      if (silent) return;
-      if (text === "none") this.add(time_ms, "failsafe", "ok", "event.failsafe_over");
-      else this.add(time_ms, "failsafe", "alarm", "event.failsafe", { cause: { sentence: text }, action: { sentence: verb ?? "" } });
+      this.toldFailsafe(time_ms, text, verb ?? "");
       return;
     }
     const phase = PHASE_WORD[text] ?? text;
     if (PHASES.includes(phase)) this.add(time_ms, "phase", PHASE_TONE[phase] ?? "info", `phase.${phase}`);
+  }
+  toldFailsafe(at, cause, action) {
+    const ended = cause === "none";
+    // What does nothing and what a guard ordered is no failsafe to a guard, and its end says nothing either.
+    if (!ended) this.quiet = action === "none" || cause === "operator";
+    if (this.quiet) return;
+    if (ended) {
+      this.toldOver = { failsafe: this.toldNow, at, number: this.add(at, "failsafe", "ok", "event.failsafe_over") };
+      this.quiet = true;
+      return;
+    }
+    const over = this.toldOver;
+    this.toldOver = null;
+    this.toldNow = `${cause}/${action}`;
+    if (over && over.failsafe === this.toldNow && at - over.at < AGAIN_MS) this.entries = this.entries.filter((entry) => entry.number !== over.number);
+    else this.add(at, "failsafe", "alarm", "event.failsafe", { cause: { sentence: cause }, action: { sentence: action } });
   }
 }

@@ -5,7 +5,7 @@ import { ACTIONS, ROOMS, causesIn, inFlight, word } from "../pure/codes.js";
 import { progress } from "../pure/rooms.js";
 import { h, fill, icon, setData, setText, show } from "../view/dom.js";
 import { sentence } from "../words/sentences.js";
-import { number, t, timeOfDay } from "../words/text.js";
+import { capital, number, t, timeOfDay } from "../words/text.js";
 
 const BATTERY_CAUSES = 6;
 
@@ -119,6 +119,12 @@ function valuesOf(values) {
   return Object.fromEntries(Object.entries(values).map(([name, value]) => [name, value?.key ? t(value.key) : value?.sentence !== undefined ? sentence(value.sentence) : value]));
 }
 
+/** What the drone says of a cause begins small; names of people stay as they are. */
+function wordsOf(key, values) {
+  const words = t(key, valuesOf(values)).replace(/: $/, "");
+  return key === "event.failsafe" || key === "event.told" ? capital(words) : words;
+}
+
 export class EventsPanel {
   constructor(session) {
     this.session = session;
@@ -135,7 +141,7 @@ export class EventsPanel {
     if (count === this.drawn) return;
     this.drawn = count;
     fill(this.rows, entries.slice(0, 120).map(({ at, tone, key, values }) => h("li", { data: { tone } }, h("time", {}, timeOfDay(at)),
-      h("span", {}, t(key, valuesOf(values)).replace(/: $/, ""), values.report ? [" ", h("a", { href: `#/reports/${values.report}` }, t("events.report"))] : null))));
+      h("span", {}, wordsOf(key, values), values.report ? [" ", h("a", { href: `#/reports/${values.report}` }, t("events.report"))] : null))));
   }
 }
 
