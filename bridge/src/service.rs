@@ -109,6 +109,7 @@ impl Service for Bridge {
         self.gate.set_clients(self.network.clients());
         self.hear_sticks(now);
         self.hear(now);
+        self.give(now);
         self.wish(now);
         self.pass(now);
         self.settle(now);
@@ -230,12 +231,16 @@ impl Bridge {
         }
     }
 
-    /// Gives orders whose time has come, and answers those that are settled.
-    fn settle(&mut self, now: u64) {
+    /// Gives orders whose time has come.
+    fn give(&mut self, now: u64) {
         let command = &mut self.command;
         while let Some((asker, failed)) = self.pending.give(now, |order| command.publish(order)) {
             self.network.answer(asker, Some((Encoding::APPLICATION_JSON, failed.to_string().into_bytes())));
         }
+    }
+
+    /// Answers orders that are settled.
+    fn settle(&mut self, now: u64) {
         while let Some((asker, answer)) = self.pending.answered(now) {
             self.answer(asker, &answer);
         }

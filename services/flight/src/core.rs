@@ -1,6 +1,7 @@
 //! The whole of `flight` without ports: pilot's wishes, pings and bytes in; bytes and reports out.
 
 use crate::arming::ArmSwitch;
+use crate::beat::{Asked, Beat};
 use crate::config::{Config, Profile};
 use crate::felt::Felt;
 use crate::frame::MAX_FRAME;
@@ -16,12 +17,6 @@ use ipc_types::{
     ARM_WITH_THE_RADIO, Attitude, Channels, FlightState, Ladder as Step, LinkState, Power, Text,
 };
 
-/// Time between two frames when nobody gives the beat: 50 a second.
-const FRAME_NS: u64 = 20_000_000;
-/// The pilot gives the beat at 50 a second; its next message is waited for this long.
-const PATIENT_FRAME_NS: u64 = 24_000_000;
-/// Least time between two frames, however fast the pilot publishes.
-const FAST_FRAME_NS: u64 = 18_000_000;
 /// In the override profile the sticks are neutral for so long first: a switch that is already on must not put
 /// the sticks to their stops (FACTS 1).
 const NEUTRAL_FIRST_NS: u64 = 1_000_000_000;
@@ -47,7 +42,7 @@ pub struct Core {
     fresh: bool,
     orphan_ns: Option<u64>,
     first_frame_ns: Option<u64>,
-    sent_us: [u16; 18],
+    beat: Beat,
     tilt_cos: f32,
     felt: Felt,
     refused: u64,
@@ -71,7 +66,7 @@ impl Core {
             fresh: false,
             orphan_ns: None,
             first_frame_ns: None,
-            sent_us: [0; 18],
+            beat: Beat::default(),
             tilt_cos: 1.0,
             felt: Felt::default(),
             refused: 0,
@@ -145,16 +140,24 @@ impl Core {
             return;
         }
         let mut out = [0; MAX_FRAME];
-        if known && self.link.order_settled(now) && self.frame_due(now, decision.step) {
-            let (mut channels, count) = self.channels(now, &decision, raised, armed);
-            StickLaw::of(self.link.identity()).translate(&mut channels);
-            if let Ok(length) = self.link.write_frame(now, &channels, count, &mut out) {
-                self.outbox.push(&out[..length]);
-                self.first_frame_ns.get_or_insert(now);
-                self.sent_us = [0; 18];
-                self.sent_us[..count].copy_from_slice(&channels[..count]);
-                self.fresh = false;
-            }
+        let (mut channels, count) = self.channels(now, &decision, raised, armed);
+        StickLaw::of(self.link.identity()).translate(&mut channels);
+        let asked = Asked {
+            channels: &channels,
+            count,
+            followed: decision.step == Step::Following,
+            fresh: self.fresh,
+            source: self.wish.map_or(0, |wish| wish.source),
+        };
+        if known
+            && self.link.order_settled(now)
+            && self.beat.due(now, self.link.frame_ns(), &asked)
+            && let Ok(length) = self.link.write_frame(now, &channels, count, &mut out)
+        {
+            self.outbox.push(&out[..length]);
+            self.first_frame_ns.get_or_insert(now);
+            self.beat.sent(&asked);
+            self.fresh = false;
         }
         let eager = self.switch.eager();
         while let Some(length) = self.link.write_question(now, eager, self.wish.is_none(), &mut out) {
@@ -185,13 +188,6 @@ impl Core {
         if throttle.is_some() || now.saturating_sub(since) >= ORPHAN_NS {
             self.wish = Some(Wish::orphan(now, throttle.unwrap_or(default)));
         }
-    }
-
-    fn frame_due(&self, now: u64, step: Step) -> bool {
-        let Some(last) = self.link.frame_ns() else { return true };
-        let since = now.saturating_sub(last);
-        let patient = if step == Step::Following { PATIENT_FRAME_NS } else { FRAME_NS };
-        since >= patient || self.fresh && since >= FAST_FRAME_NS
     }
 
     fn channels(
@@ -287,7 +283,7 @@ impl Core {
             refused: counts.refused,
             variant: self.link.identity().variant,
             version: self.link.identity().version,
-            channels_us: self.sent_us,
+            channels_us: self.beat.channels(),
             motors_us: self.link.said.motors_us,
             armed,
             link,

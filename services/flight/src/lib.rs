@@ -13,6 +13,7 @@
 
 mod arming;
 mod asked;
+mod beat;
 mod config;
 mod core;
 mod descent;

@@ -34,6 +34,8 @@ pub struct Wish {
     pub count: usize,
     /// Motors are to run.
     pub arm: bool,
+    /// Who moves the drone, an [`ipc_types::ChannelSource`] code.
+    pub source: u8,
     /// Roll stick that keeps the body level, microseconds.
     pub level_roll_us: u16,
     /// Pitch stick that keeps the body level, microseconds.
@@ -88,6 +90,7 @@ impl Wish {
             channels_us,
             count: count.max(AUX_ANGLE + 1),
             arm: message.arm == 1,
+            source: message.source,
             level_roll_us: level(message.level_roll_us),
             level_pitch_us: level(message.level_pitch_us),
             hover_us: (1050.0..=1900.0).contains(&hover).then_some(hover),
@@ -109,6 +112,7 @@ impl Wish {
             channels_us,
             count: AUX_ANGLE + 1,
             arm: true,
+            source: ipc_types::ChannelSource::Failsafe.code(),
             level_roll_us: CENTRE_US,
             level_pitch_us: CENTRE_US,
             hover_us: (throttle_us > IDLE_THROTTLE_US).then_some(f32::from(throttle_us)),

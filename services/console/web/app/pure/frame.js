@@ -3,8 +3,9 @@
 /** While the button is held, and while the sticks are had but not flown by. */
 export const HELD_MS = 20;
 export const IDLE_MS = 50;
-/** New input is sent at once, but no sooner after the last message: the drone takes a hundred a second. */
+/** The drone takes a hundred messages a second: new input is sent at once while one is saved up, else as the next is due. */
 export const LEAST_MS = 10;
+const SAVED = 2;
 
 const NOTHING = { forward: 0, left: 0, up: 0, turn: 0, held: false, arm: "absent" };
 
@@ -39,16 +40,21 @@ export class Pace {
     this.sent = null;
     this.sequence = -1;
     this.held = false;
+    this.saved = SAVED;
   }
   due(sequence, held, now) {
     if (held !== this.held || this.sent === null) return true;
-    const gap = sequence === this.sequence ? (held ? HELD_MS : IDLE_MS) - 1 : LEAST_MS;
-    return now - this.sent >= gap;
+    if (sequence !== this.sequence) return this.savedBy(now) >= 1;
+    return now - this.sent >= (held ? HELD_MS : IDLE_MS) - 1;
   }
   mark(sequence, held, now) {
+    this.saved = Math.max(0, this.savedBy(now) - 1);
     this.sequence = sequence;
     this.held = held;
     this.sent = now;
+  }
+  savedBy(now) {
+    return this.sent === null ? SAVED : Math.min(SAVED, this.saved + (now - this.sent) / LEAST_MS);
   }
 }
 

@@ -67,16 +67,20 @@ export class DockPanel {
     const hold = new Hold(CUT_HOLD_MS);
     const words = h("strong", {}, t("order.cut"));
     const element = h("button", { type: "button", class: "cut" }, h("span", { class: "cut-fill", "aria-hidden": "true" }), icon("cut"), h("span", { class: "cut-words" }, words, h("small", {}, t("order.cut_hint"))));
+    const look = () => {
+      if (hold.look(performance.now())) this.give("cut", element);
+    };
     const step = () => {
-      const now = performance.now();
-      element.style.setProperty("--hold", hold.progress(now).toFixed(3));
-      if (hold.look(now)) this.give("cut", element);
+      element.style.setProperty("--hold", hold.progress(performance.now()).toFixed(3));
+      look();
       if (hold.since !== null) requestAnimationFrame(step);
     };
     const press = () => {
       if (element.disabled) return;
       hold.press(performance.now());
       setData(element, "held", true);
+      // A screen that is drawn slowly does not make the cut later.
+      setTimeout(look, CUT_HOLD_MS);
       step();
     };
     const release = () => {

@@ -7,6 +7,8 @@ use floorplan::DistanceField;
 
 /// Free way beyond which nothing matters at indoor speeds, metres.
 const FAR_M: f32 = 4.0;
+/// What is no farther ahead is abreast: where a slide along a thing ends, rounding would say one or the other. Metres.
+const ABREAST_M: f32 = 1e-4;
 /// Directions within a cone that an echo is tried at.
 const ARC: [f32; 7] = [-1.0, -0.667, -0.333, 0.0, 0.333, 0.667, 1.0];
 /// Up to this standard deviation the place is sure of where the disc is, metres: twice what a flight with a flow sensor
@@ -146,7 +148,7 @@ impl Shield {
 /// Way of a disc of radius `wide` in a direction until its edge is at a point, metres; infinite past it.
 fn way_to(point: Vector, direction: Vector, wide: f32) -> f32 {
     let (ahead, aside) = (point.dot(direction), point.cross(direction).abs());
-    if ahead > 0.0 && aside < wide {
+    if ahead > ABREAST_M && aside < wide {
         (ahead - (wide * wide - aside * aside).sqrt()).max(0.0)
     } else {
         f32::INFINITY
@@ -184,7 +186,8 @@ mod tests {
         // The triangle of sides 3, 4 and 5: 0.15 m aside, the edge is 0.2 m ahead of the middle.
         assert!((way(0.6, 0.15) - 0.4).abs() < 1e-6 && (way(0.6, -0.15) - 0.4).abs() < 1e-6);
         assert_eq!(way(0.1, 0.1), 0.0, "within the disc already");
-        for (x, y) in [(0.6, 0.25), (0.6, -0.3), (0.0, 0.1), (-0.1, 0.0)] {
+        assert_eq!(way(2e-4, 0.1), 0.0, "and not past it");
+        for (x, y) in [(0.6, 0.25), (0.6, -0.3), (5e-5, 0.2), (0.0, 0.1), (-0.1, 0.0)] {
             assert_eq!(way(x, y), f32::INFINITY, "{x}, {y} is passed");
         }
     }
