@@ -143,6 +143,11 @@ impl App {
         self.say(&json!({ "op": "subscribe", "subscriptions": asked })).await;
     }
 
+    async fn subscribe_all(&mut self) {
+        let topics: Vec<_> = self.channels.keys().cloned().collect();
+        self.subscribe(&topics.iter().map(String::as_str).collect::<Vec<_>>()).await;
+    }
+
     /// The next message of any channel.
     async fn message(&mut self) -> Shown {
         loop {
@@ -222,13 +227,21 @@ fn an_app_on_this_machine_sees_the_drone_fly() {
         let mut app = App::connect(&url, Some("file://")).await;
         layout_and_schemas_hold(&app);
         within("refusals", nothing_comes_in(&mut app)).await;
+        let mut stalled = App::connect(&url, None).await;
+        stalled.subscribe_all().await;
         within("flight", it_flies(&mut app, &system)).await;
         within("a second app", a_late_app_sees_plan_and_picture(&url)).await;
+        within("a stalled app", who_does_not_read_loses_messages(&mut app, &mut stalled)).await;
         within("silence", silence_is_said(&mut app, &system)).await;
     });
     let (counted, complaints) = passing.end();
     assert!(counted["passed"].as_u64().unwrap() > 100, "{counted}");
     assert_eq!(counted["not_understood"], 0, "{complaints}");
+    let lost = counted["lost"].as_u64().unwrap();
+    assert!(
+        lost * 20 < counted["passed"].as_u64().unwrap(),
+        "one app stood still, and the drone was heard: {counted}"
+    );
     for words in ["sereno-1 is silent", "sereno-1 is heard again", "https://evil.example"] {
         assert_eq!(complaints.matches(words).count(), 1, "{words}: {complaints}");
     }
@@ -390,6 +403,37 @@ async fn a_late_app_sees_plan_and_picture(url: &str) {
             _ => key |= is_key(&shown.bytes),
         }
     }
+}
+
+/// Sequence of the next pose.
+async fn sequence(app: &mut App) -> u64 {
+    loop {
+        let shown = app.message().await;
+        if shown.topic == "/localization/pose" {
+            let pose: Value = serde_json::from_slice(&shown.bytes).unwrap();
+            return pose["header"]["sequence"].as_u64().unwrap();
+        }
+    }
+}
+
+/// Poses that go by while one app does not read: with what the flight took, some megabytes more than the system buffers.
+const POSES_MISSED: usize = 300;
+
+/// An app that has not read for a while missed more than a second of poses, twenty a second, and goes on with newer ones; the
+/// others were shown what came.
+async fn who_does_not_read_loses_messages(app: &mut App, stalled: &mut App) {
+    let mut newest = 0;
+    for _ in 0..POSES_MISSED {
+        newest = sequence(app).await;
+    }
+    let mut last = sequence(stalled).await;
+    let mut widest = 0;
+    while last < newest {
+        let next = sequence(stalled).await;
+        widest = widest.max(next - last);
+        last = next;
+    }
+    assert!(widest > 20, "it was never more than {widest} poses behind, so this shows nothing");
 }
 
 /// A bridge that is gone is said to be, and is followed again when it is back.

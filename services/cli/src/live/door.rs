@@ -3,6 +3,7 @@
 //! ([`hidden_address`]), and the known one belongs to this door. It opens to programs, which send no `Origin`, and to pages
 //! of listed origins; then it passes bytes on and looks no further. Connections, heads and waits are bounded.
 
+use rustix::net::sockopt;
 use std::collections::BTreeSet;
 use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -20,6 +21,8 @@ const HEAD_BYTES: usize = 16 * 1024;
 const HEAD_FIELDS: usize = 64;
 /// For so long the head of a request may take.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// What waits in the system for an app that does not read; what else waits, the server counts and drops.
+const BUFFER_BYTES: usize = 64 * 1024;
 /// Refused origins that are named, each once.
 const NAMED: usize = 16;
 /// How much of a refused origin is printed.
@@ -223,6 +226,8 @@ impl Doorkeeper {
         client.set_read_timeout(None)?;
         client.set_nodelay(true)?;
         server.set_nodelay(true)?;
+        sockopt::set_socket_send_buffer_size(client, BUFFER_BYTES)?;
+        sockopt::set_socket_recv_buffer_size(&server, BUFFER_BYTES)?;
         (&mut &server).write_all(head)?;
         let end = |sides: [&TcpStream; 2]| {
             for side in sides {

@@ -59,11 +59,11 @@ fn rows() -> Value {
     ])
 }
 
-/// A plan of three cells by two, walls left and above.
+/// A plan of three cells by three, walls left and above.
 fn picture(shade: u8) -> Vec<u8> {
-    let pixels = vec![0, 0, 0, 0, shade, 254];
+    let pixels = vec![0, 0, 0, 0, 0, 0, 0, shade, 254];
     let mut bytes = std::io::Cursor::new(Vec::new());
-    image::GrayImage::from_raw(3, 2, pixels).unwrap().write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    image::GrayImage::from_raw(3, 3, pixels).unwrap().write_to(&mut bytes, image::ImageFormat::Png).unwrap();
     bytes.into_inner()
 }
 
@@ -184,7 +184,7 @@ fn a_plan_is_shown_to_who_begins_to_watch_and_when_it_is_another() {
     assert!(screen.take().is_empty());
     channels.show_again(&["/plan".to_owned()]);
     let plan: Grid = screen.only("/plan");
-    assert_eq!((plan.column_count, plan.data.to_vec()), (3, vec![255, 0, 0, 255, 255, 255]));
+    assert_eq!((plan.column_count, plan.data.to_vec()), (3, vec![255, 0, 0, 255, 255, 255, 255, 255, 255]));
     let corner = plan.pose.unwrap().position.unwrap();
     assert_eq!((corner.x, corner.y), (-1.0, 2.0));
 
@@ -193,7 +193,7 @@ fn a_plan_is_shown_to_who_begins_to_watch_and_when_it_is_another() {
     let more = json!([{ "topic": "flight/power", "form": "json", "type": "Power" }]);
     channels.renew(&about(&more), &picture(0)).unwrap();
     let plan: Grid = screen.only("/plan");
-    assert_eq!(plan.data.to_vec(), [255, 255, 0, 255, 255, 255]);
+    assert_eq!(plan.data[..3], [255, 255, 0]);
     assert!(channels.topics().any(|topic| topic == "flight/power"), "told by the new start alone");
 
     let heard = text(
