@@ -44,7 +44,9 @@ message! {
         /// Vertical velocity, up positive.
         pub climb_m_s: f32,
         /// 1 while the pilot believes the skids are on the ground.
-        pub on_ground: u32,
+        pub on_ground: u16,
+        /// 1 when a hand has moved or let go: not to wait for the beat of the frames.
+        pub prompt: u16,
     }
 }
 

@@ -99,7 +99,9 @@ impl Core {
     /// A message of the pilot. One that makes no sense is counted and not followed.
     pub fn pilot(&mut self, now: u64, message: &Channels) {
         match Wish::read(message, now) {
-            Some(wish) => {
+            Some(mut wish) => {
+                // What was to be sent at once and was not yet is still to be.
+                wish.prompt |= self.fresh && self.wish.is_some_and(|waiting| waiting.prompt);
                 self.wish = Some(wish);
                 self.fresh = true;
             }
@@ -147,6 +149,7 @@ impl Core {
             count,
             followed: decision.step == Step::Following,
             fresh: self.fresh,
+            prompt: self.wish.is_some_and(|wish| wish.prompt),
             source: self.wish.map_or(0, |wish| wish.source),
         };
         if known

@@ -48,6 +48,8 @@ pub struct Wish {
     pub climb_m_s: f32,
     /// The skids are on the ground.
     pub on_ground: bool,
+    /// A hand has moved or let go.
+    pub prompt: bool,
 }
 
 /// Sticks in the middle, throttle and arm switch low, angle mode.
@@ -97,6 +99,7 @@ impl Wish {
             height_m: message.height_m.is_finite().then_some(message.height_m),
             climb_m_s: if message.climb_m_s.is_finite() { message.climb_m_s.clamp(-2.0, 2.0) } else { 0.0 },
             on_ground: message.on_ground == 1,
+            prompt: message.prompt == 1,
         })
     }
 
@@ -119,6 +122,7 @@ impl Wish {
             height_m: None,
             climb_m_s: 0.0,
             on_ground: throttle_us <= IDLE_THROTTLE_US,
+            prompt: false,
         }
     }
 }

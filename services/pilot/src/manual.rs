@@ -3,7 +3,7 @@
 use crate::command::{Ruling, refused};
 use crate::core::PilotCore;
 use crate::senses::{LEAST_LEFT_NS, age_s};
-use control::{Flip, Hand, Lease, StickInput, SticksHeard, TakeOver, Terms, Under, Vector};
+use control::{Axes, Flip, Hand, Lease, StickInput, SticksHeard, TakeOver, Terms, Under, Vector};
 use core::fmt::Write;
 use ipc_types::{Command, Phase, Sticks, Text};
 
@@ -13,6 +13,8 @@ const STANDS_M_S: f32 = 0.2;
 const BRAKED_S: f32 = 3.0;
 /// So much of the climb goes on when the stick is let go, seconds: that height is held, not one that was passed.
 const CARRIES_S: f32 = 0.3;
+/// A stick that has moved by so much since that was last said is not kept waiting, of a full deflection.
+const PROMPT: f32 = 0.1;
 
 /// What tells one holder of the sticks from another.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +46,10 @@ pub(crate) struct ByHand {
     pub(crate) lost_ns: Option<u64>,
     /// Since when it has been coming to a stop.
     pub(crate) stopping_ns: Option<u64>,
+    /// Where the sticks were when a move of theirs was last called prompt.
+    told: Axes,
+    /// They have moved since, or been let go.
+    pub(crate) prompt: bool,
 }
 
 impl PilotCore {
@@ -161,6 +167,11 @@ impl PilotCore {
                 self.by_hand.lost_ns = Some(made_ns);
             }
             self.hands_off(now, "who held the sticks fell silent");
+        }
+        let axes = self.followed().map_or(Axes::default(), |input| input.axes);
+        self.by_hand.prompt = axes.apart(&self.by_hand.told) >= PROMPT;
+        if self.by_hand.prompt {
+            self.by_hand.told = axes;
         }
         let hand = self.by_hand.lease.hand();
         if hand != before {

@@ -91,7 +91,8 @@ impl PilotCore {
             !self.airborne() || self.height.silent_s(now) < self.config.failsafe.height_descend_s;
         out.height_m = if height_known { self.height.height_m() } else { f32::NAN };
         out.climb_m_s = self.height.climb_m_s();
-        out.on_ground = u32::from(!self.airborne());
+        out.on_ground = u16::from(!self.airborne());
+        out.prompt = u16::from(self.by_hand.prompt);
     }
 
     /// Writes the state, every field but the header.

@@ -317,7 +317,7 @@ impl Pilot {
             hover_throttle_us: self.hover,
             height_m: f32::NAN,
             climb_m_s: self.climb,
-            on_ground: u32::from(self.on_ground),
+            on_ground: u16::from(self.on_ground),
             ..Channels::default()
         }
     }

@@ -64,7 +64,7 @@ impl Pilot {
             hover_throttle_us: self.throttle_us as f32,
             height_m: truth.z_m,
             climb_m_s: truth.velocity_m_s[2],
-            on_ground: u32::from(self.height_m.is_none()),
+            on_ground: u16::from(self.height_m.is_none()),
             ..Channels::default()
         }
     }

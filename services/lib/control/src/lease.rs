@@ -49,6 +49,14 @@ impl Axes {
         [self.forward, self.left, self.up, self.turn].iter().all(|axis| axis.abs() <= band)
     }
 
+    /// By how much the one that differs most does.
+    #[must_use]
+    pub fn apart(&self, other: &Self) -> f32 {
+        [self.forward - other.forward, self.left - other.left, self.up - other.up, self.turn - other.turn]
+            .into_iter()
+            .fold(0.0, |most, difference| most.max(difference.abs()))
+    }
+
     /// What they ask for: nothing within `band`, and from there evenly on to the full deflection.
     #[must_use]
     pub fn beyond(&self, band: f32) -> Self {

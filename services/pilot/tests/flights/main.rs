@@ -8,6 +8,7 @@ mod floor;
 mod hand;
 mod home;
 mod kept;
+mod orders;
 mod rig;
 mod sense;
 
