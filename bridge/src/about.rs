@@ -2,6 +2,7 @@
 
 use crate::config::BridgeConfig;
 use crate::form::{Form, encoding, type_name};
+use crate::revision::BuildingFiles;
 use floorplan::{Area, NamedArea, PlanHeader, Sidecar};
 use ipc_types::{Message, TopicVisitor, visit_topic};
 use runtime::{Start, StartError};
@@ -81,6 +82,10 @@ impl About {
             })
             .collect();
         let vehicle = &start.vehicle;
+        let files = BuildingFiles {
+            header: start.root.join(&start.system.plan),
+            sidecar: start.root.join(start.sidecar_name()),
+        };
         let json = json!({
             "name": start.system.name,
             "version": env!("CARGO_PKG_VERSION"),
@@ -95,6 +100,8 @@ impl About {
                 "origin_x_m": origin_x,
                 "origin_y_m": origin_y,
             },
+            // What a change of it must say that it was made from.
+            "revision": files.revision().map_err(StartError::invalid)?,
             "building": building(&Sidecar { pad: start.pad()?, ..sidecar.clone() }),
             "pad": start.pad()?.map(|pad| json!({ "x_m": pad.x, "y_m": pad.y, "heading_rad": pad.heading_rad() })),
             "rooms": areas(&sidecar.rooms),

@@ -11,6 +11,8 @@ pub const MAX_EDIT: usize = 262_144;
 pub const MAX_PICTURE: usize = 1_048_576;
 /// Finest and coarsest cell of a plan that is sent, metres: what `plan.resolution` of a file may be, too.
 const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.01..=0.5;
+/// Longest name of who makes a change, bytes: an e-mail address.
+pub const LONGEST_ACCOUNT: usize = 254;
 /// How far from the pad walls are looked for, metres.
 const CLEARANCE_M: f32 = 2.0;
 
@@ -28,6 +30,8 @@ pub struct EditText {
     /// Role of the account; that of the certificate when absent.
     #[serde(default)]
     pub role: String,
+    /// `revision` of `about`, from which the change was made.
+    pub made_from: String,
     /// The side file as it is to be.
     pub building: Sidecar,
     /// A new plan, whose picture comes beside; absent when the plan stays.
@@ -56,8 +60,10 @@ pub struct Edit {
     pub beacon_ns: u64,
     /// Role of the account, if it has one.
     pub role: Option<Role>,
-    /// Who makes it, as it is logged.
+    /// Who makes it, as it is logged; empty for the certificate itself.
     pub account: String,
+    /// `revision` of the building from which it was made.
+    pub made_from: String,
     building: Sidecar,
     plan: Option<(PlanText, Vec<u8>)>,
 }
@@ -93,6 +99,16 @@ impl Edit {
         })?;
         let id = crate::order::identity(&text.id)?;
         let role = crate::order::claimed_role(&text.role)?;
+        if text.account.len() > LONGEST_ACCOUNT || text.account.chars().any(char::is_control) {
+            return Err(format!("account: at most {LONGEST_ACCOUNT} bytes of text"));
+        }
+        if text.made_from.len() != 16 || !text.made_from.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+            let given: String = text.made_from.chars().take(20).collect();
+            return Err(format!(
+                "made_from = {}: allowed are the 16 hexadecimal digits of `revision` in about",
+                manifest::plain(&given)
+            ));
+        }
         let building = text.building.checked("building").map_err(|error| error.to_string())?;
         let plan = match (text.plan, picture) {
             (None, None) => None,
@@ -100,7 +116,15 @@ impl Edit {
             (Some(_), None) => return Err("plan: its picture is missing beside it".to_owned()),
             (None, Some(_)) => return Err("there is a picture and no plan for it".to_owned()),
         };
-        Ok(Self { id, beacon_ns: text.beacon_ns, role, account: text.account, building, plan })
+        Ok(Self {
+            id,
+            beacon_ns: text.beacon_ns,
+            role,
+            account: text.account,
+            made_from: text.made_from,
+            building,
+            plan,
+        })
     }
 
     /// One sentence on what is changed.
@@ -173,9 +197,10 @@ mod tests {
     ];
 
     fn change(building: &Value, plan: &Value) -> Vec<u8> {
-        json!({ "id": "00000000000000aa", "beacon_ns": 7, "building": building, "plan": plan })
-            .to_string()
-            .into_bytes()
+        json!({ "id": "00000000000000aa", "beacon_ns": 7, "made_from": "00000000000000bb",
+            "building": building, "plan": plan })
+        .to_string()
+        .into_bytes()
     }
 
     fn files(building: &Value) -> Result<Files, String> {
@@ -258,6 +283,27 @@ mod tests {
         assert!(refused(tiny, &png).contains("plan.resolution_m"));
         let far = json!({ "resolution_m": 0.05, "origin_x_m": 1e9, "origin_y_m": 0.0 });
         assert!(refused(far, &png).contains("`origin` is 1000000000"));
+    }
+
+    #[test]
+    fn what_it_was_made_from_is_said_and_who_made_it_is_a_name() {
+        let building = json!({ "pad": { "x": 1.0, "y": 0.8 } });
+        let said = |key: &str, value: Value| {
+            let mut text: Value = serde_json::from_slice(&change(&building, &Value::Null)).unwrap();
+            text[key] = value;
+            Edit::parse(text.to_string().as_bytes(), None).map(|edit| edit.made_from)
+        };
+        assert_eq!(said("made_from", json!("0123456789abcdef")).unwrap(), "0123456789abcdef");
+        for wrong in
+            [json!(""), json!("0123456789abcdeg"), json!("0".repeat(4000)), json!("0123456789abcdéf")]
+        {
+            let error = said("made_from", wrong).unwrap_err();
+            assert!(error.starts_with("made_from = ") && error.len() < 200, "{error}");
+        }
+        assert!(said("made_from", Value::Null).unwrap_err().contains("not the JSON of a change"));
+        for wrong in [json!("a\nb"), json!("a".repeat(255))] {
+            assert_eq!(said("account", wrong).unwrap_err(), "account: at most 254 bytes of text");
+        }
     }
 
     #[test]

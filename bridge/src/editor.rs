@@ -5,6 +5,7 @@ use crate::edit::{Edit, Files, Present, stem};
 use crate::files::write_public;
 use crate::network::{Asker, reply_now, spawn};
 use crate::pending::refusal;
+use crate::revision::BuildingFiles;
 use floorplan::Plan;
 use runtime::{Start, StartError};
 use serde_json::{Value, json};
@@ -28,9 +29,7 @@ struct Work {
     plan: Arc<Plan>,
     /// As the manifest names it.
     name: String,
-    /// The header's own path.
-    header: PathBuf,
-    sidecar: PathBuf,
+    files: BuildingFiles,
     radius_m: f32,
     /// Of the running system; none for a bridge that was started by hand.
     run_dir: Option<PathBuf>,
@@ -45,8 +44,10 @@ impl Editor {
         let name = start.system.plan.clone();
         let work = Work {
             plan: start.plan()?,
-            header: start.root.join(&name),
-            sidecar: start.root.join(start.sidecar_name()),
+            files: BuildingFiles {
+                header: start.root.join(&name),
+                sidecar: start.root.join(start.sidecar_name()),
+            },
             name,
             radius_m: start.vehicle.body.radius_m,
             run_dir: std::env::var_os(runtime::env::RUN_DIR).map(PathBuf::from),
@@ -108,30 +109,35 @@ impl Work {
         {
             return Err("the drone flies: land first".to_owned());
         }
+        self.files.check(&edit.made_from)?;
         let present = Present { plan: &self.plan, name: &self.name, radius_m: self.radius_m };
         let files = edit.files(&present)?;
         self.write(&files)?;
+        if let Err(error) = self.files.sign(&edit.account) {
+            // Who comes after is told that it was changed, and not by whom.
+            tracing::warn!("bridge: {error}");
+        }
         Ok(client)
     }
 
     /// Keeps what was as `*.previous`, and writes: the picture, the side file, and last the header that names both.
     fn write(&self, files: &Files) -> Result<(), String> {
-        keep(&self.sidecar)?;
+        keep(&self.files.sidecar)?;
         let Some((header, picture, bytes)) = &files.plan else {
-            return write_public(&self.sidecar, files.sidecar.as_bytes());
+            return write_public(&self.files.sidecar, files.sidecar.as_bytes());
         };
-        keep(&self.header)?;
-        write_public(&self.header.with_file_name(picture), bytes)?;
-        write_public(&self.sidecar, files.sidecar.as_bytes())?;
-        write_public(&self.header, header.as_bytes())?;
+        keep(&self.files.header)?;
+        write_public(&self.files.header.with_file_name(picture), bytes)?;
+        write_public(&self.files.sidecar, files.sidecar.as_bytes())?;
+        write_public(&self.files.header, header.as_bytes())?;
         self.tidy(picture);
         Ok(())
     }
 
     /// Removes pictures of sent plans but the newest and the one before it.
     fn tidy(&self, newest: &str) {
-        let previous = std::fs::read_to_string(previous(&self.header)).unwrap_or_default();
-        let Some(directory) = self.header.parent() else { return };
+        let previous = std::fs::read_to_string(previous(&self.files.header)).unwrap_or_default();
+        let Some(directory) = self.files.header.parent() else { return };
         let Ok(entries) = std::fs::read_dir(directory) else { return };
         let ours = |name: &str| {
             let middle = name.strip_prefix(stem(&self.name)).and_then(|rest| rest.strip_prefix('.'));

@@ -179,9 +179,12 @@ impl Gate {
             let word = own.map_or("stranger", Role::word);
             return Err(format!("a {word} may not change the building: installer or administrator may"));
         }
-        let edit = Edit::parse(json, picture)?;
+        let mut edit = Edit::parse(json, picture)?;
         let paper = Paper { certificate, claimed: edit.role, id: edit.id, beacon_ns: edit.beacon_ns };
         self.admit(now, &paper, Role::Installer, "change the building: installer or administrator")?;
+        if edit.account.is_empty() {
+            certificate.clone_into(&mut edit.account);
+        }
         Ok(edit)
     }
 
@@ -292,7 +295,7 @@ mod tests {
     #[test]
     fn the_building_is_changed_by_installers_and_by_nobody_twice() {
         let change = |id: u64, more: &str| {
-            let building = "\"building\":{\"pad\":{\"x\":1,\"y\":1}}";
+            let building = "\"made_from\":\"00000000000000aa\",\"building\":{\"pad\":{\"x\":1,\"y\":1}}";
             format!("{{\"id\":\"{id:016x}\",\"beacon_ns\":{START},{building}{more}}}").into_bytes()
         };
         for certificate in Role::ALL {

@@ -22,6 +22,7 @@ pub mod network;
 pub mod order;
 pub mod pending;
 pub mod remote;
+pub mod revision;
 pub mod roles;
 pub mod schema;
 mod service;

@@ -13,6 +13,9 @@ use serde_json::{Value, json};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
+/// Of what a drone has, as it says itself.
+const REVISION: &str = "0123456789abcdef";
+
 fn building() -> Value {
     json!({
         "pad": { "x": 2.5, "y": 2.0, "heading_deg": 90.0 },
@@ -51,11 +54,14 @@ async fn an_edit_reaches_the_drone_whole_and_is_kept_in_the_log() {
     let (eva, drone) = ready(&bench).await;
     let (installer, _, email) = bench.account(&eva, Role::Installer, &["north"]).await;
     let route = "/api/drones/north/building";
-    let answer = installer.post(route, &json!({ "building": building() })).await;
+    let answer = installer.post(route, &json!({ "building": building(), "made_from": REVISION })).await;
     assert_eq!(answer.status, 200, "{}", answer.text);
     assert_eq!(answer.json(), json!({ "accepted": true, "text": "written; starting anew with it" }));
     // Once more: another order, not the same one again.
-    assert_eq!(installer.post(route, &json!({ "building": building() })).await.json()["accepted"], true);
+    assert_eq!(
+        installer.post(route, &json!({ "building": building(), "made_from": REVISION })).await.json()["accepted"],
+        true
+    );
     let edits = drone.heard.lock().unwrap().edits.clone();
     assert_eq!(edits.len(), 2);
     assert_ne!(edits[0].payload["id"], edits[1].payload["id"]);
@@ -63,6 +69,7 @@ async fn an_edit_reaches_the_drone_whole_and_is_kept_in_the_log() {
         assert_eq!(edit.key, "sereno/north/edit/console");
         assert_eq!(edit.payload["building"], building());
         assert_eq!(edit.payload["plan"], Value::Null);
+        assert_eq!(edit.payload["made_from"], REVISION);
         assert_eq!(edit.payload["account"].as_str(), Some(email.as_str()));
         assert_eq!(edit.payload["role"], "installer");
         assert!(edit.picture.is_none());
@@ -72,7 +79,7 @@ async fn an_edit_reaches_the_drone_whole_and_is_kept_in_the_log() {
     // What the drone refuses is an answer, too.
     let mut without = building();
     without["pad"] = Value::Null;
-    let answer = installer.post(route, &json!({ "building": without })).await.json();
+    let answer = installer.post(route, &json!({ "building": without, "made_from": REVISION })).await.json();
     assert_eq!(answer, json!({ "accepted": false, "text": "not in the air" }));
     let log: Vec<Value> = bench.log(&eva).await.into_iter().filter(|line| line["kind"] == "plan").collect();
     assert_eq!(log.len(), 3);
@@ -106,18 +113,32 @@ async fn a_wrong_building_is_refused_by_name_and_reaches_no_drone() {
     for (place, value, says) in cases {
         let mut wrong = building();
         *wrong.pointer_mut(place).unwrap() = value;
-        let reply = eva.post("/api/drones/north/building", &json!({ "building": wrong })).await;
+        let reply = eva
+            .post("/api/drones/north/building", &json!({ "building": wrong, "made_from": REVISION }))
+            .await;
         let sentence = refused(&reply, 400);
         assert!(sentence.contains(says), "{place}: {sentence}");
     }
     let mut huge = building();
     huge["note"] = json!("x".repeat(300_000));
-    refused(&eva.post("/api/drones/north/building", &json!({ "building": huge })).await, 413);
+    refused(
+        &eva.post("/api/drones/north/building", &json!({ "building": huge, "made_from": REVISION })).await,
+        413,
+    );
+    for made_from in [json!(""), json!("0123456789abcdeg"), json!("0".repeat(1000))] {
+        let edit = json!({ "building": building(), "made_from": made_from });
+        let sentence = refused(&eva.post("/api/drones/north/building", &edit).await, 400);
+        assert!(sentence.contains("`made_from`"), "{sentence}");
+    }
+    refused(&eva.post("/api/drones/north/building", &json!({ "building": building() })).await, 400);
     assert!(drone.heard.lock().unwrap().edits.is_empty());
     // A drone that is gone hears nothing, and that is said.
     drone.disappear().await;
     bench.sees(&eva, "north", false).await;
-    let answer = eva.post("/api/drones/north/building", &json!({ "building": building() })).await.json();
+    let answer = eva
+        .post("/api/drones/north/building", &json!({ "building": building(), "made_from": REVISION }))
+        .await
+        .json();
     assert_eq!(answer, json!({ "accepted": false, "text": "the drone is not reached" }));
 }
 
@@ -252,10 +273,11 @@ async fn a_picture_becomes_a_plan_and_the_drone_gets_it() {
         assert_eq!(plan.cell_at(0.03, 5.0), Cell::Occupied);
         assert_eq!(plan.cell_at(-0.9, 2.1), Cell::Unknown);
         assert!((f64::from(plan.free_area()) - made["free_m2"].as_f64().unwrap()).abs() < 0.01);
-        let answer = eva.post(&at(&id, "/install"), &json!({})).await.json();
+        let answer = eva.post(&at(&id, "/install"), &json!({ "made_from": REVISION })).await.json();
         assert_eq!(answer["accepted"], true, "{answer}");
         let edit = drone.heard.lock().unwrap().edits.pop().unwrap();
         assert_eq!(edit.picture.as_deref(), Some(png.as_slice()));
+        assert_eq!(edit.payload["made_from"], REVISION);
         assert_eq!(edit.payload["building"], moved(building(), -1.0, 2.0));
         let place = &edit.payload["plan"];
         assert!((place["resolution_m"].as_f64().unwrap() - 0.05).abs() < 1e-6, "{place}");

@@ -25,7 +25,20 @@ fn change_as(
     plan: Option<(Value, Vec<u8>)>,
     patience: Duration,
 ) -> Option<Value> {
+    let revision = about(client)["revision"].clone();
+    change_from(client, name, (building, &revision), plan, patience)
+}
+
+/// Asks for a change that was made from the building of a revision.
+fn change_from(
+    client: &mut Client,
+    name: &str,
+    (building, revision): (&Value, &Value),
+    plan: Option<(Value, Vec<u8>)>,
+    patience: Duration,
+) -> Option<Value> {
     let mut text = client.order(Verb::Hold);
+    text["made_from"] = revision.clone();
     text["building"] = building.clone();
     let picture = plan.map(|(place, picture)| {
         text["plan"] = place;
@@ -99,9 +112,23 @@ pub(crate) fn a_round_is_taken_over(system: &System) {
     building["round"]["leave_out"] = json!([rooms[1]]);
     building["privacy"] = json!([{ "name": "Desk", "rectangle": [1.0, 1.0, 1.5, 1.5] }]);
     let old = pids(system);
-    let said = change_as(&mut installer, "installer", &building, None, CHANGE).unwrap();
+    let revision = about(&installer)["revision"].clone();
+    // Two installers began with the same building: the first is obeyed, the second writes over nothing.
+    let said = change_from(&mut installer, "installer", (&building, &revision), None, CHANGE).unwrap();
     assert_eq!(said["accepted"], true, "{said}");
     wait_anew(system, &old);
+    let mut second = connect(system, "installer");
+    wait_until("another building is told", || {
+        let now = about(&second)["revision"].clone();
+        now.is_string() && now != revision
+    });
+    let before = (files(system), pids(system));
+    let mut other = building.clone();
+    other["privacy"] = json!([]);
+    let said = change_from(&mut second, "installer", (&other, &revision), None, CHANGE).unwrap();
+    let overtaken = "the building was changed meanwhile by installer: load it anew";
+    assert_eq!((&said["accepted"], &said["text"]), (&json!(false), &json!(overtaken)));
+    assert_eq!((files(system), pids(system)), before, "nothing was written, nobody started anew");
     let client = connect(system, "viewer");
     wait_until("the new round is told", || {
         about(&client)["building"]["round"]["leave_out"] == json!([rooms[1]])

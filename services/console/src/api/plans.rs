@@ -1,7 +1,7 @@
 //! The building: its side file as the drone has it, and plans that are made of pictures.
 
 use super::drones::{drone, never};
-use crate::fleet::{Answer, PlanPlace};
+use crate::fleet::{Answer, Change, PlanPlace};
 use crate::gate::Asked;
 use crate::page::file;
 use crate::plans::Made;
@@ -34,13 +34,13 @@ fn id(asked: &Asked) -> &str {
 /// Gives an edit to the drone, and keeps that and its answer in the log.
 async fn give(
     asked: &Asked,
-    building: &Sidecar,
+    change: Change<'_>,
     plan: Option<(PlanPlace, Bytes)>,
 ) -> Result<Response<Body>, Refusal> {
     let (account, _) = asked.account()?;
     let verb = if plan.is_some() { "new plan" } else { "edit" };
     let Answer { accepted, text } =
-        asked.app.fleet.edit(&*drone(asked)?, building, plan, &account.email, account.role).await;
+        asked.app.fleet.edit(&*drone(asked)?, change, plan, &account.email, account.role).await;
     let mut entry = asked.app.entry(Kind::Plan, account, asked.address);
     entry.drone.clone_from(&asked.drone);
     verb.clone_into(&mut entry.verb);
@@ -53,12 +53,22 @@ async fn give(
 #[serde(deny_unknown_fields)]
 struct Edit {
     building: Sidecar,
+    made_from: String,
+}
+
+/// `revision` as a drone says it of itself.
+fn revision(made_from: &str) -> Result<&str, Refusal> {
+    if made_from.len() == 16 && made_from.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+        return Ok(made_from);
+    }
+    Err(Refusal::bad("`made_from` must be the 16 hexadecimal digits of `revision` in about"))
 }
 
 /// Round, points, zones, rooms, doors and pad of the plan in use.
 pub(super) async fn edit(asked: Asked) -> Result<Response<Body>, Refusal> {
-    let Edit { building } = asked.json()?;
-    give(&asked, &checked(building)?, None).await
+    let Edit { building, made_from } = asked.json()?;
+    let building = checked(building)?;
+    give(&asked, Change { building: &building, made_from: revision(&made_from)? }, None).await
 }
 
 /// The drafts of a drone.
@@ -120,15 +130,23 @@ pub(super) async fn make(asked: Asked) -> Result<Response<Body>, Refusal> {
     Ok(json(StatusCode::OK, &made))
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Install {
+    made_from: String,
+}
+
 /// Gives the plan of a draft to the drone.
 pub(super) async fn install(asked: Asked) -> Result<Response<Body>, Refusal> {
     let (_, made) = asked.app.drafts.get(&asked.drone, id(&asked)).await?;
     let made = made.ok_or_else(|| Refusal::bad("this draft has no plan yet"))?;
+    let Install { made_from } = asked.json()?;
     let picture = asked.app.drafts.plan(&asked.drone, id(&asked)).await?;
     let place = PlanPlace {
         resolution_m: made.resolution_m,
         origin_x_m: made.origin_x_m,
         origin_y_m: made.origin_y_m,
     };
-    give(&asked, &made.building, Some((place, Bytes::from(picture)))).await
+    let change = Change { building: &made.building, made_from: revision(&made_from)? };
+    give(&asked, change, Some((place, Bytes::from(picture)))).await
 }

@@ -23,12 +23,22 @@ pub(crate) struct PlanPlace {
     pub(crate) origin_y_m: f32,
 }
 
+/// What is to be, and of which building it was made.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Change<'a> {
+    /// The side file as it is to be.
+    pub(crate) building: &'a Sidecar,
+    /// `revision` of what the drone said of itself when the change was begun.
+    pub(crate) made_from: &'a str,
+}
+
 #[derive(Serialize)]
 struct Payload<'a> {
     id: String,
     beacon_ns: u64,
     account: &'a str,
     role: &'a str,
+    made_from: &'a str,
     building: &'a Sidecar,
     plan: Option<PlanPlace>,
 }
@@ -38,7 +48,7 @@ impl Fleet {
     pub(crate) async fn edit(
         &self,
         drone: &Drone,
-        building: &Sidecar,
+        change: Change<'_>,
         plan: Option<(PlanPlace, Bytes)>,
         account: &str,
         role: Role,
@@ -52,7 +62,8 @@ impl Fleet {
             beacon_ns,
             account,
             role: role.word(),
-            building,
+            made_from: change.made_from,
+            building: change.building,
             plan: plan.as_ref().map(|(place, _)| *place),
         };
         let payload = match serde_json::to_vec(&payload) {

@@ -12,7 +12,7 @@ mod signal;
 pub use drone::Drone;
 pub use link::LinkError;
 
-pub(crate) use edit::PlanPlace;
+pub(crate) use edit::{Change, PlanPlace};
 pub(crate) use hub::{Box, is_topic};
 pub(crate) use order::{Answer, Asking, Giver};
 pub(crate) use signal::Signal;

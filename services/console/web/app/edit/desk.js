@@ -20,6 +20,8 @@ export class Desk extends EventTarget {
     /** Whether the drone says what is in its building: what is not known must not be written over. */
     this.known = true;
     this.about = null;
+    /** Which building it is that is being edited. */
+    this.revision = "";
     this.error = null;
     /** The draft on the desk: {id, width, height}; null for the building in use. */
     this.draft = null;
@@ -63,6 +65,7 @@ export class Desk extends EventTarget {
       const value = await api.about(this.drone);
       this.about = aboutOf(value);
       this.known = value.building !== undefined && value.building !== null;
+      this.revision = String(value.revision ?? "");
       // A drone that does not say what is in its building says at least where rooms are.
       const building = buildingOf(value.building);
       if (!this.draft) this.history.begin({ building, reading: null });
@@ -162,8 +165,13 @@ export class Desk extends EventTarget {
   }
   /** Gives what is on the desk to the drone: its answer {accepted, text}. */
   async use() {
-    if (this.draft) return api.installDraft(this.drone, this.draft.id);
-    return api.editBuilding(this.drone, this.building);
+    if (this.draft) return api.installDraft(this.drone, this.draft.id, this.revision);
+    return api.editBuilding(this.drone, this.building, this.revision);
+  }
+  /** Whether the drone has another building by now than the one that the editing began with. */
+  async isOvertaken() {
+    const value = await api.about(this.drone).catch(() => null);
+    return value !== null && String(value.revision ?? "") !== this.revision;
   }
   /** Waits until the drone is back with what it was given; false when it was not seen so. */
   async returned(building) {

@@ -74,8 +74,10 @@ export function planView(drone, { account, drones }) {
     fill(answer, h("span", { class: "spinner", "aria-hidden": "true" }), h("span", {}, t("edit.giving")));
     try {
       const { accepted, text } = await desk.use();
-      if (!accepted) fill(answer, icon("alert"), h("span", { class: "bad-words" }, text ? sentence(text) : t("answer.refused")));
-      else {
+      if (!accepted) {
+        fill(answer, icon("alert"), h("span", { class: "bad-words" }, text ? sentence(text) : t("answer.refused")));
+        if (await desk.isOvertaken()) answer.append(button(t("edit.reload"), null, { onclick: reload }));
+      } else {
         fill(answer, h("span", { class: "spinner", "aria-hidden": "true" }), h("span", {}, t("edit.taking")));
         desk.inUse = building;
         desk.forget();
@@ -89,6 +91,13 @@ export function planView(drone, { account, drones }) {
     }
     giving = false;
     if (!ended) update();
+  }
+
+  /** Takes the drone's building as it is now; a draft stays on the desk. */
+  async function reload() {
+    if (!desk.draft && desk.unsaved && !confirm(t("edit.forget_sure"))) return;
+    await desk.load();
+    fill(answer);
   }
 
   function update() {

@@ -63,10 +63,11 @@ export const eraseRecording = (drone, id) => request("POST", `/api/drones/${path
 export const filmUrl = (drone, id) => `/api/drones/${path(drone)}/recordings/${path(id)}/film.mp4`;
 
 // The building, and plans that are made of pictures.
-export const editBuilding = (drone, building) => request("POST", `/api/drones/${path(drone)}/building`, { building });
+/** `made_from` is the `revision` of what the drone said of itself when the editing began. */
+export const editBuilding = (drone, building, made_from) => request("POST", `/api/drones/${path(drone)}/building`, { building, made_from });
 export const draft = (drone, id) => request("GET", `/api/drones/${path(drone)}/drafts/${path(id)}`);
 export const makePlan = (drone, id, making) => request("POST", `/api/drones/${path(drone)}/drafts/${path(id)}`, making);
-export const installDraft = (drone, id) => request("POST", `/api/drones/${path(drone)}/drafts/${path(id)}/install`, {});
+export const installDraft = (drone, id, made_from) => request("POST", `/api/drones/${path(drone)}/drafts/${path(id)}/install`, { made_from });
 export const addDraft = (drone, file) => send("POST", `/api/drones/${path(drone)}/drafts`, file.type || "application/octet-stream", file);
 export const draftPictureUrl = (drone, id) => `/api/drones/${path(drone)}/drafts/${path(id)}/picture`;
 export const draftPlanUrl = (drone, id) => `/api/drones/${path(drone)}/drafts/${path(id)}/plan.png`;

@@ -627,6 +627,7 @@ export default {
   "edit.taking": "Accepted. The drone starts anew with it…",
   "edit.taken": "The drone flies by it now.",
   "edit.not_back": "Accepted, but the drone has not come back yet.",
+  "edit.reload": "Load it anew",
 
   "change.title": "This will change",
   "change.none": "Nothing has been changed.",

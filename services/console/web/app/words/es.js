@@ -627,6 +627,7 @@ export default {
   "edit.taking": "Aceptado. El dron se reinicia con ello…",
   "edit.taken": "El dron ya vuela con ello.",
   "edit.not_back": "Aceptado, pero el dron aún no ha vuelto.",
+  "edit.reload": "Cargarlo de nuevo",
 
   "change.title": "Esto va a cambiar",
   "change.none": "No hay cambios.",

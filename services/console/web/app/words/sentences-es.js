@@ -212,6 +212,8 @@ export default [
   ["this draft has no plan yet", "este borrador aún no tiene plano"],
   ["building: `{field}` is {value}, allowed is {range}", "edificio: `{field}` es {value}; se admite {range}"],
   ["plan: `{field}` is {value}, allowed is {range}", "plano: `{field}` es {value}; se admite {range}"],
+  ["the building was changed meanwhile by {who}: load it anew", "{who} ha cambiado el edificio entretanto: cárguelo de nuevo"],
+  ["the building was changed meanwhile: load it anew", "el edificio ha cambiado entretanto: cárguelo de nuevo"],
   ["the drone flies: land first", "el dron está volando: aterrice primero"],
   ["round and zones: saved; the drone starts anew with it", "ronda y zonas guardadas; el dron se reinicia con ellas"],
   ["the drone is not reached", "el dron está fuera de alcance"],
