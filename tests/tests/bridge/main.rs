@@ -13,7 +13,7 @@ use ipc_types::{Channels, Command, PilotState, Sticks, Verb};
 use race::sticks;
 use runtime::{Input, Tool};
 use serde_json::{Value, json};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use system::{System, Way, free_endpoint, now_s, wait_until};
 
@@ -226,7 +226,7 @@ fn the_command_line_does_the_same(system: &System) {
 }
 
 /// Frames of the channels that were heard until it was over, and those between them that were not.
-fn count_frames(system: &System, over: &AtomicBool) -> (u64, u64) {
+fn count_frames(system: &System, heard: &AtomicU64, over: &AtomicBool) -> (u64, u64) {
     let mut tool = system.tool();
     let mut channels = tool.ports.input::<Channels>().unwrap();
     let (mut last, mut frames, mut gaps) = (None, 0_u64, 0_u64);
@@ -237,6 +237,7 @@ fn count_frames(system: &System, over: &AtomicBool) -> (u64, u64) {
             last = Some(sequence);
             frames += 1;
         }
+        heard.store(frames, Ordering::Relaxed);
         std::thread::sleep(Duration::from_millis(2));
     }
     (frames, gaps)
@@ -251,10 +252,11 @@ fn a_flood_loses_no_frame(system: &System) {
         (0..10_000).map(|_| guard.order(Verb::Hold).to_string().into_bytes()).collect();
     let key = guard.keys.command(&verb_word(Verb::Hold), "guard");
     let began = Instant::now();
-    let over = AtomicBool::new(false);
+    let (heard, over) = (AtomicU64::new(0), AtomicBool::new(false));
     let ((flooded, answered, stop), (frames, gaps)) = std::thread::scope(|scope| {
         // A reader that does nothing else: what it misses was not sent.
-        let reader = scope.spawn(|| count_frames(system, &over));
+        let listening = race::Listening(&over);
+        let reader = scope.spawn(|| count_frames(system, &heard, &over));
         for payload in payloads {
             zenoh::Wait::wait(guard.session.get(&key).payload(payload).callback(|_| {}).timeout(ANSWER))
                 .unwrap();
@@ -263,7 +265,9 @@ fn a_flood_loses_no_frame(system: &System) {
         let asked = Instant::now();
         let stop = other.give(Verb::Stop).expect("stop is answered");
         let answered = asked.elapsed();
-        over.store(true, Ordering::Relaxed);
+        // A flood that is over at once shows in what comes after it.
+        wait_until("frames", || heard.load(Ordering::Relaxed) > 100);
+        drop(listening);
         ((flooded, answered, stop), reader.join().unwrap())
     });
     println!(
