@@ -175,10 +175,11 @@ impl Channels {
         if fresh.iter().any(|topic| topic == "/plan") {
             self.plan.log_with_time(&scene::plan(&self.drawn, scene::timestamp(now_ns)), now_ns);
         }
-        if fresh.iter().any(|topic| topic == "/round") && !self.round.is_null() {
-            if let Ok(round) = scene::route(&self.round, scene::timestamp(now_ns)) {
-                self.route.log_with_time(&round, now_ns);
-            }
+        if fresh.iter().any(|topic| topic == "/round")
+            && !self.round.is_null()
+            && let Ok(round) = scene::route(&self.round, scene::timestamp(now_ns))
+        {
+            self.route.log_with_time(&round, now_ns);
         }
     }
 

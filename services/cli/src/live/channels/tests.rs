@@ -24,7 +24,8 @@ impl Screen {
         let mut of_topic = shown.iter().filter(|(name, ..)| name == topic);
         let (_, _, bytes) = of_topic.next().expect(topic);
         assert!(of_topic.next().is_none(), "{topic}: one");
-        T::decode(bytes.as_slice()).ok().expect(topic)
+        let Ok(message) = T::decode(bytes.as_slice()) else { panic!("{topic} does not decode") };
+        message
     }
 }
 
