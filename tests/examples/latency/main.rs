@@ -123,12 +123,14 @@ impl Bench {
         Some([page_ms, wanted.first()?.at_ms, self.carried(&wanted)?])
     }
 
-    /// The cut: how long after the end of its hold the line says that motors stop.
-    async fn cut(&mut self) -> Option<f64> {
+    /// The cut: when its hold ended, and when the page, the pilot and the line said that motors stop.
+    async fn cut(&mut self) -> Option<[f64; 4]> {
         let button =
             "[...document.querySelectorAll('button')].find((b) => b.innerText.includes('Cut motors'))";
         let hold = format!(
-            "(sereno.pressed = {NOW}, ({button}).dispatchEvent(new PointerEvent('pointerdown', \
+            "(sereno.send = WebSocket.prototype.send, WebSocket.prototype.send = function (data) {{ \
+             if (String(data).includes('\"cut\"')) sereno.cut = {NOW}; sereno.send.call(this, data); }}, \
+             sereno.pressed = {NOW}, ({button}).dispatchEvent(new PointerEvent('pointerdown', \
              {{ bubbles: true, pointerId: 1, button: 0, isPrimary: true }})), sereno.pressed)"
         );
         let held_ms = self.guard.look(&hold).await.as_f64()?;
@@ -142,7 +144,9 @@ impl Bench {
         tokio::time::sleep(Duration::from_millis(100)).await;
         let stops = |channels: &[u16]| channels.get(AUX1).is_some_and(|us| *us < 1300);
         let frame = self.tap.since(held_ms).into_iter().find(|frame| stops(&frame.channels))?;
-        Some(frame.at_ms - held_ms - HOLD_MS)
+        let page_ms = self.guard.look("sereno.cut").await.as_f64()?;
+        let pilot_ms = self.topics.wanted(held_ms).iter().find(|wanted| !wanted.arm)?.at_ms;
+        Some([held_ms + HOLD_MS, page_ms, pilot_ms, frame.at_ms])
     }
 }
 
@@ -187,7 +191,10 @@ async fn main() {
     say("stop pressed in the page to the SET_RAW_RC that brakes", &stops, |[page, _, line]| line - page);
     say("  page to pilot", &stops, |[page, pilot, _]| pilot - page);
     say("  pilot to the line", &stops, |[_, pilot, line]| line - pilot);
-    say("end of the cut's hold to the SET_RAW_RC that disarms", &cuts, |after| *after);
+    say("end of the cut's hold to the SET_RAW_RC that disarms", &cuts, |[held, .., line]| line - held);
+    say("  end of the hold to its order in the page", &cuts, |[held, page, ..]| page - held);
+    say("  page to pilot", &cuts, |[_, page, pilot, _]| pilot - page);
+    say("  pilot to the line", &cuts, |[_, _, pilot, line]| line - pilot);
 }
 
 /// Starts the round, or goes on with it, until it flies.

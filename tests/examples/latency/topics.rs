@@ -24,6 +24,8 @@ pub(crate) struct Wanted {
     /// Milliseconds since 1970.
     pub(crate) at_ms: f64,
     pub(crate) source: Option<ChannelSource>,
+    /// Motors are to run.
+    pub(crate) arm: bool,
     /// Roll, pitch, throttle, yaw, microseconds.
     pub(crate) us: [u16; 4],
 }
@@ -61,6 +63,7 @@ impl Topics {
                     heard.wanted.push(Wanted {
                         at_ms: at_ms(message.header.stamp_ns),
                         source: ChannelSource::from_code(message.source),
+                        arm: message.arm == 1,
                         us: [roll, pitch, throttle, yaw],
                     });
                 }

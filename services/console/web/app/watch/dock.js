@@ -114,13 +114,15 @@ export class DockPanel {
   }
   /** Gives an order and shows it pending, then what came of it. */
   async give(verb, control, more = {}) {
+    // On its way before anything is drawn.
+    const answer = this.session.order(verb, more);
     this.setSheet(false);
     const name = verb === "patrol-start" && this.offered?.primary.key === "order.resume" ? t("order.resume") : t(`verb.${verb}`);
     const row = h("p", { class: "feedback-row", data: { outcome: "pending" } }, h("span", { class: "spinner", "aria-hidden": "true" }), h("span", {}, t("answer.pending", { order: name })));
     this.feedback.append(row);
     while (this.feedback.children.length > 3) this.feedback.firstElementChild.remove();
     if (control) setData(control, "pending", true);
-    const { outcome, text } = await this.session.order(verb, more);
+    const { outcome, text } = await answer;
     if (control) setData(control, "pending", false);
     setData(row, "outcome", outcome);
     const words = outcome === "accepted" ? t("answer.accepted", { order: name }) : outcome === "refused" ? sentence(text) || t("answer.refused") : t(`answer.${outcome}`);
