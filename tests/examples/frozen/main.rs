@@ -3,7 +3,7 @@
 //! and pilot; times are those of the pilot's own messages.
 //!
 //! ```sh
-//! cargo build --release --workspace && cargo run --release --workspace --example frozen -- 10
+//! cargo build --release --workspace --bins --example frozen && target/release/examples/frozen 10
 //! ```
 #![allow(
     clippy::unwrap_used,

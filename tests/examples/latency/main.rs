@@ -3,7 +3,7 @@
 //! listened to between `flight` and the simulated controller.
 //!
 //! ```sh
-//! cargo build --release --workspace && cargo build --release --workspace --example latency
+//! cargo build --release --workspace --bins --example latency
 //! target/release/examples/latency 100 40 10    # sticks, stops, cuts: each cut takes a system of its own
 //! ```
 #![allow(
