@@ -110,8 +110,9 @@ impl Client {
         }
         let replies = question.wait().ok()?;
         while let Ok(reply) = replies.recv() {
-            if let Ok(sample) = reply.result() {
-                return Some(sample.payload().to_bytes().into_owned());
+            match reply.result() {
+                Ok(sample) => return Some(sample.payload().to_bytes().into_owned()),
+                Err(error) => println!("{key}: {}", String::from_utf8_lossy(&error.payload().to_bytes())),
             }
         }
         None
