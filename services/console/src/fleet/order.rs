@@ -6,6 +6,7 @@ use crate::role::Role;
 use crate::secret::hexadecimal;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
+use zenoh::Wait;
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Reply;
@@ -102,17 +103,24 @@ impl Fleet {
             return Answer::refused("the order cannot be written");
         };
         let key = format!("sereno/{}/command/{verb}/{}", drone.name, self.certificate);
-        let replies = self
-            .session
-            .get(key)
-            .payload(payload)
-            .encoding("application/json")
-            // Before all telemetry. Where even that queue is full the link is dead: no answer, and no thread held up.
-            .priority(Priority::RealTime)
-            .congestion_control(CongestionControl::Drop)
-            .express(true)
-            .timeout(PATIENCE)
-            .await;
+        // Before all telemetry. A machine that is short of time may have no place in the queue for some milliseconds, and a stop
+        // must not be dropped for that; where there is none for half a second, the link is cut (`zenoh_config`). The answer comes
+        // back by the same rules.
+        let session = self.session.clone();
+        let ask = move || {
+            session
+                .get(key)
+                .payload(payload)
+                .encoding("application/json")
+                .priority(Priority::RealTime)
+                .congestion_control(CongestionControl::Block)
+                .express(true)
+                .timeout(PATIENCE)
+                .wait()
+        };
+        let Ok(replies) = tokio::task::spawn_blocking(ask).await else {
+            return Answer::refused("the order cannot be sent: the console is ending");
+        };
         let replies = match replies {
             Ok(replies) => replies,
             Err(error) => return Answer::refused(format!("the order cannot be sent: {error}")),
