@@ -43,6 +43,8 @@ const HOLD_MS: f64 = 1000.0;
 const MOVED_US: u16 = 12;
 /// Most of each kind: the drone flies on one battery.
 const MOST_TRIALS: usize = 200;
+/// A browser, a console and a system that have all been started a moment ago are still at it; a guard's page is open for hours.
+const SETTLED: Duration = Duration::from_secs(10);
 /// Now in the page, milliseconds since 1970.
 const NOW: &str = "performance.timeOrigin + performance.now()";
 
@@ -179,6 +181,7 @@ async fn main() {
             bench.end().await;
             bench = Bench::start().await;
             start_round(&bench.guard, &mut bench.drone).await;
+            tokio::time::sleep(SETTLED).await;
         }
         cuts.push(bench.cut().await);
     }
