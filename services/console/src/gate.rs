@@ -13,6 +13,7 @@ use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{FromRequestParts, RawPathParams, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Response, StatusCode, header, request::Parts};
 use axum::routing::{MethodFilter, on};
+use futures_util::StreamExt;
 use std::collections::HashMap;
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -218,12 +219,32 @@ fn query_of(parts: &Parts) -> HashMap<String, String> {
 async fn read(row: &Route, body: Body) -> Result<Bytes, Refusal> {
     let time = if row.action == Action::AddDraft { PICTURE_TIME } else { BODY_TIME };
     let most = row.body_bytes();
-    match tokio::time::timeout(time, axum::body::to_bytes(body, most)).await {
-        Ok(Ok(bytes)) => Ok(bytes),
-        Ok(Err(_)) => Err(Refusal::new(
+    match tokio::time::timeout(time, whole(body, most)).await {
+        Ok(Some(bytes)) => Ok(bytes),
+        Ok(None) => Err(Refusal::new(
             StatusCode::PAYLOAD_TOO_LARGE,
             format!("the request is longer than {most} bytes, or broke off"),
         )),
         Err(_) => Err(Refusal::new(StatusCode::REQUEST_TIMEOUT, "the request took too long to come")),
     }
+}
+
+/// The body; `None` when it is longer or broke off. As much again is read and dropped: who is still sending does not read why he is
+/// refused, he sees the connection break.
+async fn whole(body: Body, most: usize) -> Option<Bytes> {
+    let mut parts = body.into_data_stream();
+    let (mut bytes, mut length) = (Vec::new(), 0_usize);
+    while let Some(part) = parts.next().await {
+        let part = part.ok()?;
+        length = length.saturating_add(part.len());
+        if length > most.saturating_mul(2) {
+            return None;
+        }
+        if length > most {
+            bytes = Vec::new();
+        } else {
+            bytes.extend_from_slice(&part);
+        }
+    }
+    (length <= most).then(|| bytes.into())
 }
