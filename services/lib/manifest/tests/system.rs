@@ -250,7 +250,8 @@ fn the_graph_shows_every_topic_and_reader() {
         "    sonar ==>|sonar/ranges| localization",
         "    sonar -->|sonar/ranges| pilot",
         "    localization -.->|localization/particles| localization",
-        "    operator -->|operator/command| pilot",
+        "    operator ==>|operator/command| pilot",
+        "    operator -->|operator/command| navigation",
         "    sonar ==>|sim/ping| simulator",
     ] {
         assert!(graph.lines().any(|l| l == line), "{line}\n{graph}");
